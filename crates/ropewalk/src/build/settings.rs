@@ -1,0 +1,120 @@
+//! One documented struct of settings, with presets.
+
+use crate::cost::LeafCost;
+
+/// Which planes a builder looks at and which measure it minimises.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Measure {
+    /// The middle of the cell, axes in turn x, y, z.
+    SpatialMedian,
+    /// The median of the primitives' centroids, axes in turn.
+    ObjectMedian,
+    /// MacDonald and Booth 1990 as published: nine sampled planes between the spatial and the
+    /// object median on each axis, primitives sorted by their boxes without clipping.
+    MacDonaldBooth1990,
+    /// The same measure minimised exactly over all event planes.
+    #[default]
+    MacDonaldBooth,
+    /// The paper's measure as printed, children paired by side.
+    HavranPrinted,
+    /// The paper's measure as printed, children paired crosswise.
+    HavranPrintedCrossed,
+    /// The paper's measure as it should be: the expectation with ray termination, `f*`.
+    Termination,
+}
+
+/// How the probabilities `p_L`, `p_R` that a ray ends in a child are estimated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum TerminationEstimator {
+    /// `p = 1 - exp(-beta * 2 S / A_cell)` with the exact one-sided area S inside the child.
+    SurfaceArea {
+        /// Exponent; `None` calibrates it at the root with sampled lines.
+        beta: Option<f64>,
+    },
+    /// `p = 1 - exp(-(area projected onto the cut) / a_c)` (after Moulin et al. 2015).
+    Projection,
+    /// The share of sampled uniform lines that end in the child; `SurfaceArea` below `stop_below`
+    /// primitives.
+    SampledLines {
+        /// Lines sampled in each node, 64 to 256 sensible.
+        lines: u32,
+        /// Number of primitives under which lines no longer pay.
+        stop_below: u32,
+    },
+}
+
+impl Default for TerminationEstimator {
+    fn default() -> Self {
+        TerminationEstimator::SurfaceArea { beta: None }
+    }
+}
+
+/// When a node becomes a leaf.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Termination {
+    /// At `leaf_size` primitives or fewer, or at `max_depth`; any plane is taken until then.
+    Fixed {
+        /// Largest number of primitives of a leaf above the depth limit.
+        leaf_size: u32,
+        /// Depth at which every node is a leaf; `None` is `1.2 log2 N + 2`.
+        max_depth: Option<u32>,
+    },
+    /// Havran and Bittner 2002: depth `1.2 log2 N + 2`; a split fails if
+    /// `best cost / leaf cost > max_ratio`; `1 + 0.2 max_depth` failures are allowed on a path.
+    Automatic {
+        /// Ratio above which a split counts as a failure (0.75 in the thesis).
+        max_ratio: f64,
+    },
+    /// Wald and Havran 2006: a leaf where no split is cheaper than the leaf.
+    Cost {
+        /// Depth limit; `None` is `1.2 log2 N + 8`.
+        max_depth: Option<u32>,
+    },
+}
+
+/// Everything that steers a build.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildSettings {
+    /// Planes and measure.
+    pub measure: Measure,
+    /// Estimator of ray termination, for the measures that use it.
+    pub estimator: TerminationEstimator,
+    /// The cost of a set of primitives.
+    pub leaf_cost: LeafCost,
+    /// When to stop.
+    pub termination: Termination,
+    /// Cost of a traversal step in intersection tests.
+    pub traversal_cost: f64,
+    /// Factor on the cost of a plane with an empty side, `0 < f <= 1`; 1 is off.
+    pub empty_factor: f64,
+    /// Cut empty slabs off a node that would become a leaf (the paper's Figure 2).
+    pub late_cutting: bool,
+    /// Clip primitives to the cell ("perfect splits"); otherwise their boxes are sorted.
+    pub clipping: bool,
+    /// Largest number of references in all leaves as a multiple of the number of primitives; the
+    /// build stops splitting what would exceed it. Shared out over the children in proportion to
+    /// their counts, so that the tree does not depend on the number of threads.
+    pub max_duplication: f64,
+    /// Threads; 0 is one per core. The tree is the same for any number.
+    pub threads: usize,
+}
+
+impl Default for BuildSettings {
+    fn default() -> Self {
+        BuildSettings {
+            measure: Measure::MacDonaldBooth,
+            estimator: TerminationEstimator::default(),
+            leaf_cost: LeafCost::Linear,
+            termination: Termination::Cost { max_depth: None },
+            traversal_cost: 1.0,
+            empty_factor: 0.8,
+            late_cutting: true,
+            clipping: true,
+            max_duplication: 32.0,
+            threads: 0,
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! Ray casting on axis-aligned BSP trees (kd-trees) built with the surface-area heuristic and
+//! threaded with ropes and rope trees.
+//!
+//! The data flow is one way: [`Geometry`] holds the primitives, [`build`](mod@build) makes a
+//! [`BspTree`](tree::BspTree) from their boxes and clips, [`rope`] threads its leaves, and
+//! [`traverse`] shoots rays through any of them. The crate does no I/O and prints nothing.
+
+pub mod aabb;
+pub mod build;
+pub mod cost;
+pub mod geometry;
+pub mod method;
+pub mod primitive;
+pub mod ray;
+pub mod rope;
+pub mod traverse;
+pub mod tree;
+
+pub use aabb::Aabb;
+pub use geometry::{Geometry, GeometryError};
+pub use primitive::{Shape, Sides};
+pub use ray::{Hit, Ray};

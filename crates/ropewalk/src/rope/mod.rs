@@ -1,0 +1,1 @@
+//! Ropes (neighbour links) and rope trees over the leaves of a tree.

@@ -1,0 +1,7 @@
+//! Ray walks, each written once and generic over the query and the counters.
+
+mod counters;
+mod query;
+
+pub use counters::{Counters, Counts, NoCounts};
+pub use query::{ClosestHit, Occluded, Query};
