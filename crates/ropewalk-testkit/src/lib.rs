@@ -1,1 +1,3 @@
-//! Part of the ropewalk workspace; see its README.
+//! Generators and checks shared by the tests of ropewalk.
+
+pub mod data;
