@@ -1,0 +1,52 @@
+# Two commands do everything: `make demo` and `make test`. Both say what they do.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+CARGO ?= cargo
+OUT ?= out
+FUZZ_SECONDS ?= 60
+
+.PHONY: help demo test check fmt clippy unit doc fuzz bench-build clean
+
+help: ## List the commands
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
+
+tools:
+	@command -v $(CARGO) >/dev/null || { echo "make: cargo was not found. Install Rust with rustup (https://rustup.rs), then run this command again."; exit 1; }
+	@command -v cc >/dev/null || { echo "make: no C compiler (cc) was found; Rust needs it to link. On Debian: apt-get install gcc."; exit 1; }
+
+demo: tools ## Render a scene to a picture and print what each idea of the 1997 paper is worth on it
+	@echo "==> building (release)"
+	@$(CARGO) build --release --locked --quiet -p ropewalk-cli
+	@mkdir -p $(OUT)
+	@echo "==> rendering the SPD scene gears:4 (9,345 polygons) by the SPD rules"
+	@./target/release/ropewalk render spd:gears:4 --spd-rules -o $(OUT)/gears.png
+	@echo "==> the paper's experiment on the same scene"
+	@./target/release/ropewalk paper --scenes gears --size standard -o $(OUT)/paper.html
+	@echo "==> picture: $(OUT)/gears.png   report: $(OUT)/paper.html"
+
+test: tools fmt clippy unit doc fuzz ## Everything that CI runs: format, lints, tests, doc tests, docs, fuzz
+
+fmt: tools
+	@echo "==> format"
+	@$(CARGO) fmt --all --check
+
+clippy: tools
+	@echo "==> lints"
+	@$(CARGO) clippy --workspace --all-targets --locked --quiet -- -D warnings
+
+unit: tools
+	@echo "==> tests and doc tests"
+	@$(CARGO) test --workspace --locked --no-fail-fast
+
+doc: tools
+	@echo "==> docs"
+	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked --quiet
+
+fuzz: tools ## Fuzz the NFF reader for FUZZ_SECONDS (needs a nightly toolchain)
+	@scripts/fuzz $(FUZZ_SECONDS)
+
+bench-build: tools ## Time the builder from 10^4 to 10^6 triangles
+	@$(CARGO) run --release --locked --quiet -p ropewalk-bench --bin build
+
+clean: ## Remove everything made here
+	@rm -rf $(OUT) target
