@@ -4,6 +4,14 @@
 //! Readers and generators speak to a [`SceneSink`], so that a scene can be held ([`Scene`]),
 //! written to a file as it is made, or merely counted.
 
+mod file;
 mod model;
+pub mod nff;
+mod sink;
+mod source;
 
+pub use file::write_atomically;
 pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, SceneSink, Surface};
+pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};
+pub use nff::{format_g, read_nff};
+pub use source::{Fault, SceneError, load_scene};

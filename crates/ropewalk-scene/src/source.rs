@@ -1,0 +1,164 @@
+//! Scenes by name: files, compressed or not, and built-in scenes.
+
+use crate::model::Scene;
+use crate::nff::{NffError, NffLimits};
+use flate2::bufread::MultiGzDecoder;
+use std::fs::File;
+use std::io::{self, BufRead, BufReader};
+use std::path::Path;
+
+/// Prefix of built-in scenes: `spd:NAME[:SIZE]`.
+const BUILTIN_PREFIX: &str = "spd:";
+/// The first bytes of every gzip file (RFC 1952, section 2.3.1).
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+/// Read buffer in bytes: large enough that calls into the system do not show.
+const BUFFER_BYTES: usize = 64 * 1024;
+
+/// Why a scene could not be had. Each displays as one sentence that names the scene.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The file cannot be opened.
+    #[error("{path}: cannot open the scene file: {}", open_reason(.source))]
+    Open {
+        /// The file as the user named it.
+        path: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The path names a directory.
+    #[error("{path}: expected a scene file, found a directory")]
+    Directory {
+        /// The path as the user named it.
+        path: String,
+    },
+    /// The name ends in `.gz` but the content is not gzip.
+    #[error("{path}: expected gzip data, as the name says, found something else")]
+    NotGzip {
+        /// The file as the user named it.
+        path: String,
+    },
+    /// The text is at fault.
+    #[error(transparent)]
+    Nff(#[from] NffError),
+    /// There is no built-in scene of that name.
+    #[error("{spec}: there is no built-in scene \"{name}\"")]
+    UnknownBuiltin {
+        /// What the user asked for.
+        spec: String,
+        /// The name in it.
+        name: String,
+    },
+    /// The size of a built-in scene is no number.
+    #[error("{spec}: expected a whole number from 1 for the size, found \"{size}\"")]
+    BuiltinSize {
+        /// What the user asked for.
+        spec: String,
+        /// The size in it.
+        size: String,
+    },
+}
+
+/// Whose fault an error is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The content of the file: mend the file.
+    Input,
+    /// The name or the size asked for: ask for another one.
+    Request,
+    /// The system: permissions, disks, damaged media.
+    System,
+}
+
+impl SceneError {
+    /// Whose fault it is.
+    pub fn fault(&self) -> Fault {
+        use crate::nff::NffErrorKind;
+        match self {
+            SceneError::Open { source, .. } if source.kind() == io::ErrorKind::NotFound => {
+                Fault::Request
+            }
+            SceneError::Open { .. } => Fault::System,
+            SceneError::Nff(error) => match &error.kind {
+                NffErrorKind::Io(error) if !is_damaged_archive(error) => Fault::System,
+                _ => Fault::Input,
+            },
+            SceneError::NotGzip { .. } => Fault::Input,
+            SceneError::Directory { .. }
+            | SceneError::UnknownBuiltin { .. }
+            | SceneError::BuiltinSize { .. } => Fault::Request,
+        }
+    }
+}
+
+/// The decoder reports damage by these kinds; no device does.
+fn is_damaged_archive(error: &io::Error) -> bool {
+    use io::ErrorKind::{InvalidData, InvalidInput, UnexpectedEof};
+    matches!(error.kind(), InvalidData | InvalidInput | UnexpectedEof)
+}
+
+/// The system's reason without its error number where plain words exist.
+fn open_reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::NotFound => "there is no such file".to_owned(),
+        io::ErrorKind::PermissionDenied => "no permission to read it".to_owned(),
+        _ => error.to_string(),
+    }
+}
+
+/// Loads a scene: `spd:NAME[:SIZE]` is a built-in one, anything else the path of an NFF file, which
+/// may be compressed by gzip whatever its name. The scene's name becomes the file's name without
+/// its extensions, or `spec` itself for a built-in scene.
+///
+/// # Errors
+/// [`SceneError`]; errors in a file carry its name, line and column.
+pub fn load_scene(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
+    match spec.strip_prefix(BUILTIN_PREFIX) {
+        Some(builtin) => load_builtin(spec, builtin),
+        None => load_file(spec, limits),
+    }
+}
+
+/// Builds the scene `NAME[:SIZE]`.
+fn load_builtin(spec: &str, builtin: &str) -> Result<Scene, SceneError> {
+    let (name, size) = match builtin.split_once(':') {
+        None => (builtin, None),
+        Some((name, size)) => match size.parse::<u32>() {
+            Ok(number @ 1..) => (name, Some(number)),
+            _ => return Err(SceneError::BuiltinSize { spec: spec.into(), size: size.into() }),
+        },
+    };
+    // The built-in generators are called here, with `size` or their standard size.
+    let _ = size;
+    Err(SceneError::UnknownBuiltin { spec: spec.into(), name: name.into() })
+}
+
+fn load_file(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
+    let path = Path::new(spec);
+    let cannot_open = |source| SceneError::Open { path: spec.to_owned(), source };
+    if path.is_dir() {
+        return Err(SceneError::Directory { path: spec.to_owned() });
+    }
+    let file = File::open(path).map_err(cannot_open)?;
+    let mut input = BufReader::with_capacity(BUFFER_BYTES, file);
+    let is_gzip = input.fill_buf().map_err(cannot_open)?.starts_with(&GZIP_MAGIC);
+    let named_gzip = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let scene = if is_gzip {
+        let text = BufReader::with_capacity(BUFFER_BYTES, MultiGzDecoder::new(input));
+        Scene::read_nff(text, limits)
+    } else if named_gzip {
+        return Err(SceneError::NotGzip { path: spec.to_owned() });
+    } else {
+        Scene::read_nff(input, limits)
+    };
+    let mut scene = scene.map_err(|error| error.in_file(spec))?;
+    scene.name = stem(path);
+    Ok(scene)
+}
+
+/// The file's name without `.gz` and without the extension before it.
+fn stem(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.strip_suffix(".gz").unwrap_or(&name);
+    name.strip_suffix(".nff").unwrap_or(name).to_owned()
+}
