@@ -1,3 +1,5 @@
 //! Generators and checks shared by the tests of ropewalk.
 
 pub mod data;
+pub mod rays;
+pub mod trees;

@@ -6,6 +6,7 @@
 //! [`traverse`] shoots rays through any of them. The crate does no I/O and prints nothing.
 
 pub mod aabb;
+pub mod accelerator;
 pub mod build;
 pub mod cost;
 pub mod geometry;
@@ -17,6 +18,7 @@ pub mod traverse;
 pub mod tree;
 
 pub use aabb::Aabb;
+pub use accelerator::{Accelerator, AcceleratorError, Walk};
 pub use geometry::{Geometry, GeometryError};
 pub use primitive::{Shape, Sides};
 pub use ray::{Hit, Ray};

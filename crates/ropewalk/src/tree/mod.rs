@@ -1,7 +1,9 @@
 //! The binary BSP tree as plain data: the reference from which everything else is made.
 
+mod checked;
 mod node;
 
+pub use checked::TreeError;
 pub use node::{Node, NodeKind};
 
 use crate::aabb::Aabb;
