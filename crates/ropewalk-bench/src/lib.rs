@@ -1,1 +1,3 @@
-//! Part of the ropewalk workspace; see its README.
+//! What the benchmarks of ropewalk share.
+
+pub mod scenes;

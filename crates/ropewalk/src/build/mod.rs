@@ -1,5 +1,130 @@
 //! Builders of the binary BSP tree.
+//!
+//! One recursion serves all strategies: the fragments of a node (the boxes of its primitives' parts
+//! inside its cell) lie on a stack, a plane search picks a plane, the stack is split in two. What
+//! differs is the [`Measure`]: which planes are looked at, and at what cost.
 
+mod arena;
+mod error;
+mod event;
+mod fragment;
+mod late_cutting;
+mod monitor;
+mod plane;
+mod report;
+mod search;
 mod settings;
+mod stopping;
+mod subtree;
 
+pub use error::BuildError;
+pub use monitor::Monitor;
+pub use report::{BuildReport, StopCounts};
 pub use settings::{BuildSettings, Measure, Termination, TerminationEstimator};
+
+use crate::cost;
+use crate::geometry::Geometry;
+use crate::primitive::Primitive;
+use crate::tree::{BspTree, Node, TreeStats};
+use arena::Clipper;
+use fragment::Fragment;
+use plane::Pricing;
+use search::{MacDonaldBooth1990, ObjectMedian, PlaneSearch, SpatialMedian, Sweep};
+use std::sync::atomic::AtomicU64;
+use std::time::Instant;
+use stopping::Stopping;
+use subtree::{Context, Output};
+
+/// Builds a tree with the default settings.
+///
+/// # Errors
+/// [`BuildError::TooLarge`] where the tree outgrows its 30-bit indices.
+pub fn build_default(geometry: &Geometry) -> Result<(BspTree, BuildReport), BuildError> {
+    build(geometry, &BuildSettings::default(), &())
+}
+
+/// Builds a tree over `geometry`; the same tree for any number of threads. An empty geometry makes
+/// a single empty leaf.
+///
+/// The exact sweeps take O(N log N) time (Wald and Havran 2006), the medians and the 1990 measure
+/// O(N log N) with a smaller and a similar constant.
+///
+/// # Errors
+/// [`BuildError`] if a setting is out of range, the monitor cancels, the threads cannot be started
+/// or the tree outgrows its 30-bit indices.
+pub fn build(
+    geometry: &Geometry,
+    settings: &BuildSettings,
+    monitor: &dyn Monitor,
+) -> Result<(BspTree, BuildReport), BuildError> {
+    let start = Instant::now();
+    let settings = settings.effective()?;
+    let output = in_pool(settings.threads, || build_output(geometry, &settings, monitor))??;
+    let tree = BspTree::from_parts(geometry.bounds(), output.nodes, output.refs);
+    let seconds = start.elapsed().as_secs_f64();
+    let tree_stats = TreeStats::of(&tree);
+    let report = BuildReport {
+        settings,
+        primitives: geometry.len(),
+        degenerate: geometry.degenerate_count(),
+        duplication: tree_stats.references as f64 / geometry.len().max(1) as f64,
+        tree: tree_stats,
+        stops: output.stops,
+        seconds,
+    };
+    Ok((tree, report))
+}
+
+/// Runs `work` in a pool of its own, in the global pool (0) or without one (1).
+fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, BuildError> {
+    if threads <= 1 {
+        return Ok(work());
+    }
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|e| BuildError::Threads { threads, reason: e.to_string() })?;
+    Ok(pool.install(work))
+}
+
+fn build_output(
+    geometry: &Geometry,
+    settings: &BuildSettings,
+    monitor: &dyn Monitor,
+) -> Result<Output, BuildError> {
+    let pricing = Pricing {
+        leaf_cost: settings.leaf_cost,
+        traversal_cost: settings.traversal_cost,
+        empty_factor: settings.empty_factor,
+    };
+    let search = plane_search(settings, pricing);
+    let fragments: Vec<Fragment> = (0..geometry.len() as u32)
+        .map(|prim| Fragment::new(prim, &geometry.shape(prim).bounds()))
+        .collect();
+    let references = (settings.max_duplication * fragments.len() as f64) as u64;
+    let context = Context {
+        search: search.as_ref(),
+        clipper: Clipper { geometry, clipping: settings.clipping },
+        pricing,
+        stopping: Stopping::new(settings.termination, fragments.len()),
+        late_cutting: settings.late_cutting,
+        parallel: settings.threads != 1,
+        monitor,
+        done: AtomicU64::new(0),
+    };
+    context.build(fragments, geometry.bounds(), references.min(u64::from(Node::MAX_INDEX)))
+}
+
+fn plane_search(settings: &BuildSettings, pricing: Pricing) -> Box<dyn PlaneSearch> {
+    match settings.measure {
+        Measure::SpatialMedian => Box::new(SpatialMedian { pricing }),
+        Measure::ObjectMedian => Box::new(ObjectMedian { pricing }),
+        Measure::MacDonaldBooth1990 => Box::new(MacDonaldBooth1990 { pricing }),
+        Measure::MacDonaldBooth => Box::new(Sweep { model: cost::MacDonaldBooth, pricing }),
+        Measure::HavranPrinted => Box::new(Sweep { model: cost::HavranPrinted, pricing }),
+        Measure::HavranPrintedCrossed => {
+            Box::new(Sweep { model: cost::HavranPrintedCrossed, pricing })
+        }
+        Measure::Termination => Box::new(Sweep { model: cost::Termination, pricing }),
+    }
+}

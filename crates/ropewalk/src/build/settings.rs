@@ -1,6 +1,8 @@
 //! One documented struct of settings, with presets.
 
+use super::error::BuildError;
 use crate::cost::LeafCost;
+use crate::tree::MAX_DEPTH;
 
 /// Which planes a builder looks at and which measure it minimises.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -115,6 +117,69 @@ impl Default for BuildSettings {
             clipping: true,
             max_duplication: 32.0,
             threads: 0,
+        }
+    }
+}
+
+impl BuildSettings {
+    /// The settings in effect, checked: the 1990 measure never clips.
+    ///
+    /// # Errors
+    /// [`BuildError::Setting`] that names the first field out of range.
+    pub fn effective(&self) -> Result<BuildSettings, BuildError> {
+        let check = |ok: bool, field, found: String, expected| {
+            if ok { Ok(()) } else { Err(BuildError::Setting { field, found, expected }) }
+        };
+        let number = |ok: bool, field, found: f64, expected| {
+            check(ok && found.is_finite(), field, found.to_string(), expected)
+        };
+        let c = self.traversal_cost;
+        number(c >= 0.0, "traversal_cost", c, "a finite number, at least 0")?;
+        let f = self.empty_factor;
+        number(f > 0.0 && f <= 1.0, "empty_factor", f, "above 0 and at most 1")?;
+        let d = self.max_duplication;
+        number(d >= 1.0, "max_duplication", d, "a finite number, at least 1")?;
+        match self.leaf_cost {
+            LeafCost::Linear => {}
+            LeafCost::Blocks { width } => {
+                check(width >= 1, "leaf_cost.width", width.to_string(), "at least 1")?;
+            }
+            LeafCost::Logarithmic { a, b } => {
+                number(a >= 0.0, "leaf_cost.a", a, "a finite number, at least 0")?;
+                number(b >= 0.0, "leaf_cost.b", b, "a finite number, at least 0")?;
+            }
+        }
+        match self.termination {
+            Termination::Fixed { leaf_size: n, max_depth } => {
+                check(n >= 1, "termination.leaf_size", n.to_string(), "at least 1")?;
+                Self::check_depth(max_depth)?;
+            }
+            Termination::Automatic { max_ratio: r } => {
+                number(r > 0.0, "termination.max_ratio", r, "a finite number above 0")?;
+            }
+            Termination::Cost { max_depth } => Self::check_depth(max_depth)?,
+        }
+        match self.estimator {
+            TerminationEstimator::SurfaceArea { beta: Some(b) } => {
+                number(b > 0.0, "estimator.beta", b, "a finite number above 0")?;
+            }
+            TerminationEstimator::SampledLines { lines, .. } => {
+                check(lines >= 1, "estimator.lines", lines.to_string(), "at least 1")?;
+            }
+            _ => {}
+        }
+        let clipping = self.clipping && self.measure != Measure::MacDonaldBooth1990;
+        Ok(BuildSettings { clipping, ..self.clone() })
+    }
+
+    fn check_depth(max_depth: Option<u32>) -> Result<(), BuildError> {
+        match max_depth {
+            Some(d) if d as usize > MAX_DEPTH => Err(BuildError::Setting {
+                field: "termination.max_depth",
+                found: d.to_string(),
+                expected: "at most tree::MAX_DEPTH (96)",
+            }),
+            _ => Ok(()),
         }
     }
 }

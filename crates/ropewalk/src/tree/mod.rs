@@ -2,9 +2,13 @@
 
 mod checked;
 mod node;
+mod stats;
+mod validate;
 
 pub use checked::TreeError;
 pub use node::{Node, NodeKind};
+pub use stats::{LEAF_SIZE_BINS, TreeStats};
+pub use validate::TreeFault;
 
 use crate::aabb::Aabb;
 

@@ -57,6 +57,14 @@ impl Node {
         Node { word0: first, word1: count << 2 | Self::LEAF }
     }
 
+    /// The same node in a tree where nodes and references come `nodes` and `refs` later.
+    pub(crate) fn relocated(self, nodes: u32, refs: u32) -> Self {
+        match self.word1 & 3 {
+            Self::LEAF => Node { word0: self.word0 + refs, ..self },
+            _ => Node { word1: self.word1 + (nodes << 2), ..self },
+        }
+    }
+
     /// Unpacks the node with index `index`.
     #[inline]
     pub fn kind(self, index: u32) -> NodeKind {

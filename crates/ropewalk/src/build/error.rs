@@ -1,0 +1,38 @@
+//! Why a build failed.
+
+/// Why no tree was built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// A setting is out of range.
+    #[error("build setting `{field}` is {found}; expected {expected}")]
+    Setting {
+        /// The field of [`BuildSettings`](super::BuildSettings).
+        field: &'static str,
+        /// Its value.
+        found: String,
+        /// The valid range.
+        expected: &'static str,
+    },
+    /// The monitor asked to stop.
+    #[error("the build was cancelled")]
+    Cancelled,
+    /// More nodes or references than 30-bit indices can address.
+    #[error(
+        "the tree needs more than {max} {what}; lower max_duplication or the depth, or raise the leaf size"
+    )]
+    TooLarge {
+        /// Nodes or references.
+        what: &'static str,
+        /// The limit.
+        max: u32,
+    },
+    /// The thread pool could not be started.
+    #[error("cannot start {threads} build threads: {reason}")]
+    Threads {
+        /// Number asked for.
+        threads: usize,
+        /// What the pool said.
+        reason: String,
+    },
+}
