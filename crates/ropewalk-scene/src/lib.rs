@@ -9,6 +9,7 @@ mod model;
 pub mod nff;
 mod sink;
 mod source;
+pub mod spd;
 
 pub use file::write_atomically;
 pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, SceneSink, Surface};
