@@ -1,7 +1,4 @@
-//! What the tests of the walks share: scenes, a bench that holds every walk over one tree, and the
-//! comparison with brute force.
-
-pub mod scenes;
+//! A bench that holds every walk over one tree, and the comparison with brute force.
 
 use ropewalk::traverse::{BruteForce, Counts, NoCounts, RayCaster};
 use ropewalk::tree::{BspTree, NodeKind};

@@ -1,11 +1,10 @@
 //! Every walk over any valid tree answers exactly as brute force does, ties included.
 
-mod walk_common;
-
+use crate::bench::{Bench, coordinates};
+use crate::scenes;
 use ropewalk::Geometry;
 use ropewalk_testkit::rays::{Draw, aligned_ray, generic_ray, grid_ray, invalid_rays};
 use ropewalk_testkit::trees::TreeShape;
-use walk_common::{Bench, coordinates, scenes};
 
 /// Trees per scene and rays per tree.
 const TREES: usize = 3;

@@ -1,0 +1,6 @@
+//! The walks: each answers exactly as brute force does, over any valid tree.
+
+mod bench;
+mod exact;
+mod ropes;
+mod scenes;
