@@ -43,8 +43,11 @@ impl Draw {
         if self.chance(0.5) { magnitude } else { -magnitude }
     }
 
-    /// A point uniform in a box.
+    /// A point uniform in a box; the origin for an empty one.
     pub fn point_in(&mut self, b: &Aabb) -> [f32; 3] {
+        if b.is_empty() {
+            return [0.0; 3];
+        }
         std::array::from_fn(|a| {
             let x = self.uniform(f64::from(b.min[a]), f64::from(b.max[a])) as f32;
             x.clamp(b.min[a], b.max[a])
@@ -71,7 +74,8 @@ impl Draw {
 /// A generic ray at a scene: from in and around its box (three box sizes away at most) towards a
 /// point of the box, or in a uniform direction; length of the direction in exponent space.
 pub fn generic_ray(draw: &mut Draw, scene: &Aabb) -> Ray {
-    let reach = scene.diagonal().max(f64::MIN_POSITIVE) * draw.uniform(0.0, 3.0);
+    let size = if scene.is_empty() { 1.0 } else { scene.diagonal() };
+    let reach = size * draw.uniform(0.0, 3.0);
     let inside = draw.point_in(scene);
     let out = draw.direction();
     let origin: [f32; 3] = std::array::from_fn(|a| inside[a] + out[a] * reach as f32);

@@ -1,6 +1,7 @@
 //! The walks: each answers exactly as brute force does, over any valid tree.
 
 mod bench;
+mod builders;
 mod exact;
 mod ropes;
 mod scenes;

@@ -3,6 +3,7 @@
 
 use crate::bench::Bench;
 use crate::scenes;
+use ropewalk::build::build_default;
 use ropewalk::rope::{RopeTrees, Ropes};
 use ropewalk::traverse::{BruteForce, Counts, LeafId, NoCounts, RayCaster};
 use ropewalk::tree::{BspTree, NodeKind};
@@ -185,8 +186,7 @@ fn the_leaf_of_a_hit_starts_the_next_ray() {
 fn generic_rays_hardly_ever_restart() {
     let mut draw = Draw::new(500);
     let geometry = scenes::soup(&mut draw, 2000, 1.0);
-    let shape = TreeShape { leaf_size: 8, needless: 0.0, max_nodes: 8000, ..TreeShape::default() };
-    let tree = random_tree(&mut draw, &geometry, shape).unwrap();
+    let (tree, _) = build_default(&geometry).unwrap();
     let (geometry, tree) = (Arc::new(geometry), Arc::new(tree));
     for walk in [Walk::Ropes, Walk::RopeTrees] {
         let accelerator = Accelerator::new(geometry.clone(), tree.clone(), walk).unwrap();
