@@ -155,7 +155,7 @@ fn soup(n: u32) -> Geometry {
 
 #[test]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
-    let geometry = soup(20_000);
+    let geometry = soup(9_000);
     for measure in MEASURES {
         let max_duplication = 6.0;
         let [one, two, five] = [1, 2, 5].map(|threads| {
@@ -402,4 +402,41 @@ fn predicted_leaf_visits_are_the_areas_of_the_leaves() {
     // Sums of some thousand terms in f64, in different order.
     assert!((sum / report.tree.predicted_leaf_visits - 1.0).abs() < 1e-9);
     assert!(geometry.shape(0).area() > 0.0);
+}
+
+#[test]
+fn estimators_are_calibrated_and_their_error_is_told() {
+    use ropewalk::build::TerminationEstimator::{self, *};
+    let geometry = soup(3000);
+    let report = |estimator: TerminationEstimator| {
+        let settings = BuildSettings {
+            measure: Measure::Termination,
+            estimator,
+            threads: 1,
+            ..BuildSettings::default()
+        };
+        checked(&geometry, &settings).1
+    };
+    let calibrated = report(SurfaceArea { beta: None });
+    let beta = calibrated.beta.expect("this estimator has an exponent");
+    assert!((0.3..=1.2).contains(&beta), "open soup: {beta}");
+    let given = report(SurfaceArea { beta: Some(0.25) });
+    assert_eq!(given.beta, Some(0.25));
+    let projection = report(Projection);
+    assert_eq!(projection.beta, None);
+    let sampled = report(SampledLines { lines: 64, stop_below: 32 });
+
+    let stats = [calibrated, given, projection, sampled].map(|r| r.estimator.expect("measured"));
+    for s in &stats {
+        assert!(s.count >= 20, "{s:?}");
+        assert!(0.0 < s.mean_truth && s.mean_truth < 1.0, "{s:?}");
+    }
+    let [calibrated, given, _, sampled] = stats.map(|s| s.mean_abs_error);
+    assert!(calibrated < 0.1, "{stats:?}");
+    assert!(calibrated < given, "calibration helps: {stats:?}");
+    // 64 lines against 512 have standard errors of at most 0.0625 and 0.022, and the best of eight
+    // planes is often one whose lines were lucky.
+    assert!(sampled < 0.1, "{stats:?}");
+    let without = checked(&geometry, &BuildSettings::default()).1;
+    assert_eq!((without.beta, without.estimator), (None, None));
 }

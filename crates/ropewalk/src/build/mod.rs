@@ -5,6 +5,7 @@
 //! differs is the [`Measure`]: which planes are looked at, and at what cost.
 
 mod arena;
+mod blockage;
 mod error;
 mod event;
 mod fragment;
@@ -17,6 +18,7 @@ mod settings;
 mod stopping;
 mod subtree;
 
+pub use blockage::EstimatorStats;
 pub use error::BuildError;
 pub use monitor::Monitor;
 pub use report::{BuildReport, StopCounts};
@@ -27,6 +29,7 @@ use crate::geometry::Geometry;
 use crate::primitive::Primitive;
 use crate::tree::{BspTree, Node, TreeStats};
 use arena::Clipper;
+use blockage::{Blockage, estimator_stats};
 use fragment::Fragment;
 use plane::Pricing;
 use search::{MacDonaldBooth1990, ObjectMedian, PlaneSearch, SpatialMedian, Sweep};
@@ -59,20 +62,68 @@ pub fn build(
 ) -> Result<(BspTree, BuildReport), BuildError> {
     let start = Instant::now();
     let settings = settings.effective()?;
-    let output = in_pool(settings.threads, || build_output(geometry, &settings, monitor))??;
-    let tree = BspTree::from_parts(geometry.bounds(), output.nodes, output.refs);
-    let seconds = start.elapsed().as_secs_f64();
-    let tree_stats = TreeStats::of(&tree);
-    let report = BuildReport {
-        settings,
-        primitives: geometry.len(),
-        degenerate: geometry.degenerate_count(),
-        duplication: tree_stats.references as f64 / geometry.len().max(1) as f64,
-        tree: tree_stats,
-        stops: output.stops,
-        seconds,
+    in_pool(settings.threads, || {
+        let blockage = blockage(geometry, &settings, monitor)?;
+        let output = build_output(geometry, &settings, blockage.as_ref(), monitor)?;
+        let tree = BspTree::from_parts(geometry.bounds(), output.nodes, output.refs);
+        let seconds = start.elapsed().as_secs_f64();
+        let stats = TreeStats::of(&tree);
+        let report = BuildReport {
+            primitives: geometry.len(),
+            degenerate: geometry.degenerate_count(),
+            duplication: stats.references as f64 / geometry.len().max(1) as f64,
+            tree: stats,
+            stops: output.stops,
+            beta: blockage.as_ref().and_then(Blockage::beta),
+            estimator: blockage.map(|b| estimator_stats(geometry, &tree, &b)),
+            seconds,
+            settings,
+        };
+        Ok((tree, report))
+    })?
+}
+
+/// The estimator of a measure that uses one, calibrated.
+fn blockage<'a>(
+    geometry: &'a Geometry,
+    settings: &BuildSettings,
+    monitor: &dyn Monitor,
+) -> Result<Option<Blockage<'a>>, BuildError> {
+    if !settings.measure.uses_termination() || geometry.is_empty() {
+        return Ok(None);
+    }
+    let probe = if Blockage::needs_probe(settings.estimator) {
+        Some(probe_tree(geometry, settings, monitor)?)
+    } else {
+        None
     };
-    Ok((tree, report))
+    Ok(Some(Blockage::new(geometry, settings.estimator, probe)))
+}
+
+/// A tree that is quick to build and good enough to answer sampled lines.
+fn probe_tree(
+    geometry: &Geometry,
+    settings: &BuildSettings,
+    monitor: &dyn Monitor,
+) -> Result<BspTree, BuildError> {
+    /// Cancels, but keeps the progress of the probe to itself.
+    struct Quiet<'a>(&'a dyn Monitor);
+    impl Monitor for Quiet<'_> {
+        fn is_cancelled(&self) -> bool {
+            self.0.is_cancelled()
+        }
+    }
+    let quick = BuildSettings {
+        measure: Measure::ObjectMedian,
+        termination: Termination::Fixed { leaf_size: 8, max_depth: None },
+        clipping: false,
+        late_cutting: false,
+        max_duplication: 4.0,
+        threads: settings.threads,
+        ..BuildSettings::default()
+    };
+    let output = build_output(geometry, &quick, None, &Quiet(monitor))?;
+    Ok(BspTree::from_parts(geometry.bounds(), output.nodes, output.refs))
 }
 
 /// Runs `work` in a pool of its own, in the global pool (0) or without one (1).
@@ -90,6 +141,7 @@ fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T
 fn build_output(
     geometry: &Geometry,
     settings: &BuildSettings,
+    blockage: Option<&Blockage<'_>>,
     monitor: &dyn Monitor,
 ) -> Result<Output, BuildError> {
     let pricing = Pricing {
@@ -97,7 +149,7 @@ fn build_output(
         traversal_cost: settings.traversal_cost,
         empty_factor: settings.empty_factor,
     };
-    let search = plane_search(settings, pricing);
+    let search = plane_search(settings.measure, pricing, blockage);
     let fragments: Vec<Fragment> = (0..geometry.len() as u32)
         .map(|prim| Fragment::new(prim, &geometry.shape(prim).bounds()))
         .collect();
@@ -115,16 +167,22 @@ fn build_output(
     context.build(fragments, geometry.bounds(), references.min(u64::from(Node::MAX_INDEX)))
 }
 
-fn plane_search(settings: &BuildSettings, pricing: Pricing) -> Box<dyn PlaneSearch> {
-    match settings.measure {
+fn plane_search<'a>(
+    measure: Measure,
+    pricing: Pricing,
+    blockage: Option<&'a Blockage<'a>>,
+) -> Box<dyn PlaneSearch + 'a> {
+    match measure {
         Measure::SpatialMedian => Box::new(SpatialMedian { pricing }),
         Measure::ObjectMedian => Box::new(ObjectMedian { pricing }),
         Measure::MacDonaldBooth1990 => Box::new(MacDonaldBooth1990 { pricing }),
-        Measure::MacDonaldBooth => Box::new(Sweep { model: cost::MacDonaldBooth, pricing }),
-        Measure::HavranPrinted => Box::new(Sweep { model: cost::HavranPrinted, pricing }),
-        Measure::HavranPrintedCrossed => {
-            Box::new(Sweep { model: cost::HavranPrintedCrossed, pricing })
+        Measure::MacDonaldBooth => {
+            Box::new(Sweep { model: cost::MacDonaldBooth, pricing, blockage: None })
         }
-        Measure::Termination => Box::new(Sweep { model: cost::Termination, pricing }),
+        Measure::HavranPrinted => Box::new(Sweep { model: cost::HavranPrinted, pricing, blockage }),
+        Measure::HavranPrintedCrossed => {
+            Box::new(Sweep { model: cost::HavranPrintedCrossed, pricing, blockage })
+        }
+        Measure::Termination => Box::new(Sweep { model: cost::Termination, pricing, blockage }),
     }
 }

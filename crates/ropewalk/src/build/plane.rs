@@ -119,6 +119,12 @@ impl CellAreas {
         (self.caps + self.rim * self.local(position), self.caps + self.rim * above)
     }
 
+    /// `a_c`, the one-sided area of the cut.
+    #[inline]
+    pub fn cut(&self) -> f64 {
+        0.5 * self.caps
+    }
+
     /// True if a cut that leaves `left` and `right` of `total` fragments gains anything.
     ///
     /// Inside the cell it does unless all fragments are on both sides. At a face the part beyond

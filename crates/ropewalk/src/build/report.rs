@@ -1,5 +1,6 @@
 //! What a build did.
 
+use super::blockage::EstimatorStats;
 use super::settings::BuildSettings;
 use super::stopping::StopReason;
 use crate::tree::TreeStats;
@@ -62,6 +63,10 @@ pub struct BuildReport {
     pub duplication: f64,
     /// Why nodes became leaves.
     pub stops: StopCounts,
-    /// Wall-clock time of the build, this report not included.
+    /// Exponent of the surface-area estimator, given or calibrated; `None` where none is used.
+    pub beta: Option<f64>,
+    /// The estimator's error; `None` where the measure uses no estimator.
+    pub estimator: Option<EstimatorStats>,
+    /// Wall-clock time of the build, calibration included, this report not.
     pub seconds: f64,
 }

@@ -1,7 +1,7 @@
 //! One documented struct of settings, with presets.
 
 use super::error::BuildError;
-use crate::cost::LeafCost;
+use crate::cost::{self, CostModel, LeafCost};
 use crate::tree::MAX_DEPTH;
 
 /// Which planes a builder looks at and which measure it minimises.
@@ -24,6 +24,20 @@ pub enum Measure {
     HavranPrintedCrossed,
     /// The paper's measure as it should be: the expectation with ray termination, `f*`.
     Termination,
+}
+
+impl Measure {
+    /// True if the measure reads the probabilities of termination, and so has use for a
+    /// [`TerminationEstimator`].
+    pub fn uses_termination(self) -> bool {
+        match self {
+            Measure::SpatialMedian | Measure::ObjectMedian | Measure::MacDonaldBooth1990 => false,
+            Measure::MacDonaldBooth => cost::MacDonaldBooth::USES_TERMINATION,
+            Measure::HavranPrinted => cost::HavranPrinted::USES_TERMINATION,
+            Measure::HavranPrintedCrossed => cost::HavranPrintedCrossed::USES_TERMINATION,
+            Measure::Termination => cost::Termination::USES_TERMINATION,
+        }
+    }
 }
 
 /// How the probabilities `p_L`, `p_R` that a ray ends in a child are estimated.

@@ -15,6 +15,7 @@ use super::fragment::Fragment;
 use super::plane::{CellAreas, Counts, Plane, Pricing};
 use crate::aabb::Aabb;
 use crate::cost::MacDonaldBooth;
+use crate::primitive::AreaRamp;
 
 /// What a search may look at.
 pub(crate) struct NodeView<'a> {
@@ -29,6 +30,7 @@ pub(crate) struct NodeView<'a> {
 #[derive(Default)]
 pub(crate) struct SearchBuffers {
     centroids: Vec<f32>,
+    ramps: Vec<AreaRamp>,
 }
 
 /// A strategy.
