@@ -1,2 +1,43 @@
-//! The `ropewalk` command.
-fn main() {}
+//! The `ropewalk` command. Exit codes: 0, 1 (the input's fault), 2 (usage).
+
+mod command;
+mod engine;
+mod interrupt;
+mod output;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Ray casting on surface-area BSP trees with ropes and rope trees.
+#[derive(Parser)]
+#[command(version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Ray-trace a scene to a picture
+    Render(command::render::Args),
+    /// Write a scene of the Standard Procedural Databases as NFF
+    Scene(command::scene::Args),
+    /// Build a tree and print its figures
+    Stats(command::stats::Args),
+    /// Check every invariant of a scene's tree, ropes and rope trees
+    Validate(command::validate::Args),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse(); // exits with 2 on a wrong use
+    let result = match cli.command {
+        Command::Render(args) => command::render::run(&args),
+        Command::Scene(args) => command::scene::run(&args),
+        Command::Stats(args) => command::stats::run(&args),
+        Command::Validate(args) => command::validate::run(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => output::fail(&error),
+    }
+}

@@ -2,6 +2,7 @@
 
 use crate::model::Scene;
 use crate::nff::{NffError, NffLimits};
+use crate::spd::{self, Spd, SpdError};
 use flate2::bufread::MultiGzDecoder;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
@@ -42,7 +43,7 @@ pub enum SceneError {
     #[error(transparent)]
     Nff(#[from] NffError),
     /// There is no built-in scene of that name.
-    #[error("{spec}: there is no built-in scene \"{name}\"")]
+    #[error("{spec}: there is no built-in scene \"{name}\"; there are {}", names())]
     UnknownBuiltin {
         /// What the user asked for.
         spec: String,
@@ -57,6 +58,19 @@ pub enum SceneError {
         /// The size in it.
         size: String,
     },
+    /// The size of a built-in scene is out of range.
+    #[error("{spec}: {reason}")]
+    BuiltinRange {
+        /// What the user asked for.
+        spec: String,
+        /// The range, in words.
+        reason: String,
+    },
+}
+
+/// The names of all built-in scenes.
+fn names() -> String {
+    Spd::ALL.map(Spd::name).join(", ")
 }
 
 /// Whose fault an error is.
@@ -86,7 +100,8 @@ impl SceneError {
             SceneError::NotGzip { .. } => Fault::Input,
             SceneError::Directory { .. }
             | SceneError::UnknownBuiltin { .. }
-            | SceneError::BuiltinSize { .. } => Fault::Request,
+            | SceneError::BuiltinSize { .. }
+            | SceneError::BuiltinRange { .. } => Fault::Request,
         }
     }
 }
@@ -128,9 +143,16 @@ fn load_builtin(spec: &str, builtin: &str) -> Result<Scene, SceneError> {
             _ => return Err(SceneError::BuiltinSize { spec: spec.into(), size: size.into() }),
         },
     };
-    // The built-in generators are called here, with `size` or their standard size.
-    let _ = size;
-    Err(SceneError::UnknownBuiltin { spec: spec.into(), name: name.into() })
+    let unknown = || SceneError::UnknownBuiltin { spec: spec.into(), name: name.into() };
+    let spd = Spd::from_name(name).ok_or_else(unknown)?;
+    let mut scene = Scene { name: spec.to_owned(), ..Scene::default() };
+    match spd::generate(spd, size.unwrap_or(spd.standard_size()), &mut scene) {
+        Ok(()) => Ok(scene),
+        Err(SpdError::Sink(never)) => match never {},
+        Err(error) => {
+            Err(SceneError::BuiltinRange { spec: spec.into(), reason: error.to_string() })
+        }
+    }
 }
 
 fn load_file(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {

@@ -1,0 +1,6 @@
+//! One file a subcommand.
+
+pub mod render;
+pub mod scene;
+pub mod stats;
+pub mod validate;

@@ -1,0 +1,175 @@
+//! `ropewalk render SCENE`
+
+use crate::engine;
+use crate::interrupt;
+use crate::output::{PerRay, Rays, Seconds, Tree, print_json, thousands, usage};
+use ropewalk::method::Method;
+use ropewalk_render::{
+    AovKind, Monitor, Render, RenderSettings, check_image_path, render, write_image,
+};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `render`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A .nff or .nff.gz file, or a built-in scene such as spd:balls:4
+    scene: String,
+    /// Picture to write: .png or .exr; SCENE.png in this folder if not given
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Picture size, such as 640x480; the scene's own if not given
+    #[arg(long, value_parser = size, conflicts_with = "spd_rules")]
+    size: Option<[u32; 2]>,
+    /// Samples per pixel
+    #[arg(long, default_value_t = 1, conflicts_with = "spd_rules")]
+    samples: u32,
+    /// Largest ray depth, the eye ray being 1
+    #[arg(long, default_value_t = 5)]
+    depth: u32,
+    /// The rules of the database: rays through the pixels' corners, four averaged
+    #[arg(long)]
+    spd_rules: bool,
+    /// How to build and walk; an unknown name lists them all
+    #[arg(long, default_value = Method::DEFAULT)]
+    method: String,
+    /// Extra pictures beside the first: depth, normal, steps, tests (comma-separated)
+    #[arg(long, value_delimiter = ',')]
+    aov: Vec<String>,
+    /// Threads; 0 is one per core
+    #[arg(long, default_value_t = 0)]
+    threads: usize,
+    /// One JSON object on standard output
+    #[arg(long)]
+    json: bool,
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parts: Vec<_> = text.split('x').map(str::parse::<u32>).collect();
+    match parts[..] {
+        [Ok(w), Ok(h)] if (1..=65_536).contains(&w) && (1..=65_536).contains(&h) => Ok([w, h]),
+        _ => Err("expected WIDTHxHEIGHT with sides from 1 to 65536, such as 640x480".into()),
+    }
+}
+
+#[derive(Serialize)]
+struct Output {
+    scene: String,
+    method: &'static str,
+    picture: String,
+    aov: Vec<String>,
+    rays: Rays,
+    tree: Tree,
+    per_ray: PerRay,
+    seconds: Seconds,
+}
+
+/// Renders and writes the pictures.
+pub fn run(args: &Args) -> anyhow::Result<()> {
+    let method = engine::method(&args.method)?;
+    let aovs = aovs(&args.aov)?;
+    let loaded = engine::load(&args.scene)?;
+    let picture = args
+        .output
+        .clone()
+        .unwrap_or_else(|| format!("{}.png", loaded.scene.name.replace(':', "_")).into());
+    check_image_path(&picture)?;
+    let engine = engine::build(&loaded.geometry, &method, args.threads)?;
+    let settings = RenderSettings {
+        size: args.size,
+        samples_per_pixel: args.samples,
+        max_depth: args.depth,
+        spd_rules: args.spd_rules,
+        threads: (args.threads > 0).then_some(args.threads),
+        aov: !aovs.is_empty(),
+        ..RenderSettings::default()
+    };
+    let bar = interrupt::bar(1000, "render");
+    let flag = interrupt::flag();
+    let progress = |p: ropewalk_render::Progress| {
+        bar.set_length(p.total as u64);
+        bar.set_position(p.done as u64);
+    };
+    let monitor = Monitor { progress: Some(&progress), cancel: Some(&flag) };
+    let done = render(&loaded.scene, &loaded.geometry, &engine.accelerator, &settings, monitor)?;
+    bar.finish_and_clear();
+    if done.cancelled {
+        return Err(interrupt::interrupted());
+    }
+    done.write(&picture)?;
+    let mut extra = Vec::new();
+    for aov in aovs {
+        extra.push(write_aov(&picture, aov, &done)?);
+    }
+    let rays = Rays::from(&done.counts);
+    let output = Output {
+        scene: loaded.scene.name.clone(),
+        method: method.name,
+        picture: picture.display().to_string(),
+        aov: extra,
+        rays,
+        tree: engine
+            .report
+            .as_ref()
+            .map(|r| Tree::new(r, engine.accelerator.bytes() as u64))
+            .unwrap_or_default(),
+        per_ray: PerRay::new(&done.traversal, rays.total()),
+        seconds: Seconds {
+            read: loaded.seconds,
+            build: engine.build_seconds,
+            trace: done.seconds_trace,
+        },
+    };
+    if args.json { print_json(&output) } else { print_text(&output) }
+}
+
+fn aovs(names: &[String]) -> anyhow::Result<Vec<AovKind>> {
+    let known = || AovKind::ALL.iter().map(|a| a.name()).collect::<Vec<_>>().join(", ");
+    names
+        .iter()
+        .map(|name| {
+            AovKind::ALL.into_iter().find(|a| a.name() == name).ok_or_else(|| {
+                usage(format!("no extra picture is called '{name}'; there are: {}", known()))
+            })
+        })
+        .collect()
+}
+
+/// `picture.png` gives `picture.steps.png`.
+fn write_aov(picture: &Path, aov: AovKind, done: &Render) -> anyhow::Result<String> {
+    let extension = picture.extension().and_then(|e| e.to_str()).unwrap_or("png");
+    let path = picture.with_extension(format!("{}.{extension}", aov.name()));
+    if let Some(image) = done.aov_image(aov) {
+        write_image(&path, &image)?;
+    }
+    Ok(path.display().to_string())
+}
+
+fn print_text(o: &Output) -> anyhow::Result<()> {
+    let Output { rays: r, per_ray: p, seconds: s, .. } = o;
+    println!("{}, {}: {}", o.scene, o.method, o.picture);
+    for path in &o.aov {
+        println!("  {path}");
+    }
+    println!(
+        "  rays     {} primary ({} hit), {} reflected, {} refracted, {} shadow ({} hit)",
+        thousands(r.primary),
+        thousands(r.primary_hits),
+        thousands(r.reflection),
+        thousands(r.refraction),
+        thousands(r.shadow),
+        thousands(r.shadow_hits)
+    );
+    println!(
+        "  per ray  {:.2} intersection tests, {:.2} traversal steps, {:.2} leaves",
+        p.intersection_tests, p.traversal_steps, p.leaf_visits
+    );
+    println!(
+        "  seconds  read {:.2}, build {:.2}, trace {:.2} ({:.2} million rays a second)",
+        s.read,
+        s.build,
+        s.trace,
+        r.total() as f64 / s.trace.max(1e-9) / 1e6
+    );
+    Ok(())
+}
