@@ -111,7 +111,7 @@ pub trait SceneSink {
 /// A scene in memory. Object `i` becomes primitive `i` of [`Scene::geometry`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scene {
-    /// Name for messages: the path or the built-in name.
+    /// Name for messages: the file name without extensions, or the built-in name (`spd:balls:4`).
     pub name: String,
     /// Background colour; black if never given.
     pub background: [f64; 3],

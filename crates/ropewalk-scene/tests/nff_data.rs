@@ -156,7 +156,7 @@ fn every_file_is_tested(folder: &Path) -> Result<(), Failed> {
 fn no_permission() -> Trial {
     let locked = tempfile::NamedTempFile::with_suffix(".nff").and_then(|file| {
         #[cfg(unix)]
-        std::fs::set_permissions(file.path(), std::os::unix::fs::PermissionsExt::from_mode(0))?;
+        std::fs::set_permissions(file.path(), std::os::unix::fs::PermissionsExt::from_mode(0o0))?;
         Ok(file)
     });
     let readable = locked.as_ref().map_or(true, |file| File::open(file.path()).is_ok());

@@ -42,7 +42,7 @@ impl NffStats {
 /// complete, comments within an entity before it. Comments are cut at 4,096 bytes; bytes in them
 /// that are not UTF-8 become U+FFFD.
 ///
-/// Memory: one entity. Time: about 10 ns a byte.
+/// Memory: one entity. Time: 5 to 7 ns a byte on the processors of 2024.
 ///
 /// # Errors
 /// [`NffReadError::Input`] at the first fault of the text, a passed limit or a failed read, with
