@@ -15,4 +15,4 @@ pub use file::write_atomically;
 pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, SceneSink, Surface};
 pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};
 pub use nff::{format_g, read_nff};
-pub use source::{Fault, SceneError, load_scene};
+pub use source::{Fault, SceneError, load_scene, parse_builtin};

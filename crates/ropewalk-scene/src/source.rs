@@ -43,34 +43,33 @@ pub enum SceneError {
     #[error(transparent)]
     Nff(#[from] NffError),
     /// There is no built-in scene of that name.
-    #[error("{spec}: there is no built-in scene \"{name}\"; there are {}", names())]
+    #[error("{spec}: expected a built-in scene ({}), found \"{name}\"", builtin_names())]
     UnknownBuiltin {
         /// What the user asked for.
         spec: String,
         /// The name in it.
         name: String,
     },
-    /// The size of a built-in scene is no number.
-    #[error("{spec}: expected a whole number from 1 for the size, found \"{size}\"")]
+    /// The built-in scene does not exist in that size.
+    #[error("{spec}: expected a size from 1 to {} for {spd}, found \"{size}\"", .spd.max_size())]
     BuiltinSize {
         /// What the user asked for.
         spec: String,
+        /// The scene in it.
+        spd: Spd,
         /// The size in it.
         size: String,
     },
-    /// The size of a built-in scene is out of range.
-    #[error("{spec}: {reason}")]
-    BuiltinRange {
+    /// The built-in scene has more objects than [`NffLimits::objects`] allows.
+    #[error("{spec}: expected at most {limit} objects, found a scene of {objects}")]
+    BuiltinTooLarge {
         /// What the user asked for.
         spec: String,
-        /// The range, in words.
-        reason: String,
+        /// Objects it would have.
+        objects: u64,
+        /// The limit.
+        limit: u64,
     },
-}
-
-/// The names of all built-in scenes.
-fn names() -> String {
-    Spd::ALL.map(Spd::name).join(", ")
 }
 
 /// Whose fault an error is.
@@ -101,7 +100,7 @@ impl SceneError {
             SceneError::Directory { .. }
             | SceneError::UnknownBuiltin { .. }
             | SceneError::BuiltinSize { .. }
-            | SceneError::BuiltinRange { .. } => Fault::Request,
+            | SceneError::BuiltinTooLarge { .. } => Fault::Request,
         }
     }
 }
@@ -121,37 +120,61 @@ fn open_reason(error: &io::Error) -> String {
     }
 }
 
+fn builtin_names() -> String {
+    Spd::ALL.map(Spd::name).join(", ")
+}
+
 /// Loads a scene: `spd:NAME[:SIZE]` is a built-in one, anything else the path of an NFF file, which
 /// may be compressed by gzip whatever its name. The scene's name becomes the file's name without
-/// its extensions, or `spec` itself for a built-in scene.
+/// its extensions, or `spd:NAME:SIZE`.
 ///
 /// # Errors
 /// [`SceneError`]; errors in a file carry its name, line and column.
 pub fn load_scene(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
-    match spec.strip_prefix(BUILTIN_PREFIX) {
-        Some(builtin) => load_builtin(spec, builtin),
+    match parse_builtin(spec)? {
+        Some((spd, size)) => load_builtin(spec, spd, size, limits),
         None => load_file(spec, limits),
     }
 }
 
-/// Builds the scene `NAME[:SIZE]`.
-fn load_builtin(spec: &str, builtin: &str) -> Result<Scene, SceneError> {
+/// The database and size that `spd:NAME[:SIZE]` names, the standard size if none is given; `None`
+/// if `spec` does not begin with `spd:` and so is a path.
+///
+/// # Errors
+/// [`SceneError::UnknownBuiltin`] and [`SceneError::BuiltinSize`].
+pub fn parse_builtin(spec: &str) -> Result<Option<(Spd, u32)>, SceneError> {
+    let Some(builtin) = spec.strip_prefix(BUILTIN_PREFIX) else {
+        return Ok(None);
+    };
     let (name, size) = match builtin.split_once(':') {
         None => (builtin, None),
-        Some((name, size)) => match size.parse::<u32>() {
-            Ok(number @ 1..) => (name, Some(number)),
-            _ => return Err(SceneError::BuiltinSize { spec: spec.into(), size: size.into() }),
-        },
+        Some((name, size)) => (name, Some(size)),
     };
-    let unknown = || SceneError::UnknownBuiltin { spec: spec.into(), name: name.into() };
-    let spd = Spd::from_name(name).ok_or_else(unknown)?;
-    let mut scene = Scene { name: spec.to_owned(), ..Scene::default() };
-    match spd::generate(spd, size.unwrap_or(spd.standard_size()), &mut scene) {
+    let Some(spd) = Spd::from_name(name) else {
+        return Err(SceneError::UnknownBuiltin { spec: spec.into(), name: name.into() });
+    };
+    let Some(text) = size else {
+        return Ok(Some((spd, spd.standard_size())));
+    };
+    match text.parse() {
+        Ok(size) if spd.sizes().contains(&size) => Ok(Some((spd, size))),
+        _ => Err(SceneError::BuiltinSize { spec: spec.into(), spd, size: text.into() }),
+    }
+}
+
+fn load_builtin(spec: &str, spd: Spd, size: u32, limits: &NffLimits) -> Result<Scene, SceneError> {
+    let (objects, limit) = (spd.object_count(size), limits.objects);
+    if objects > limit {
+        return Err(SceneError::BuiltinTooLarge { spec: spec.to_owned(), objects, limit });
+    }
+    let name = format!("{BUILTIN_PREFIX}{spd}:{size}");
+    let mut scene = Scene { name, ..Scene::default() };
+    match spd::generate(spd, size, &mut scene) {
         Ok(()) => Ok(scene),
-        Err(SpdError::Sink(never)) => match never {},
-        Err(error) => {
-            Err(SceneError::BuiltinRange { spec: spec.into(), reason: error.to_string() })
+        Err(SpdError::SizeOutOfRange { spd, size }) => {
+            Err(SceneError::BuiltinSize { spec: spec.to_owned(), spd, size: size.to_string() })
         }
+        Err(SpdError::Sink(never)) => match never {},
     }
 }
 

@@ -313,18 +313,37 @@ fn what_is_no_file_is_refused() {
 }
 
 #[test]
+fn built_in_scenes_are_loaded_by_name() {
+    for (spec, name, objects) in [
+        ("spd:tetra", "spd:tetra:6", 4096),
+        ("spd:balls:2", "spd:balls:2", 92),
+        ("spd:teapot:4", "spd:teapot:4", 1008),
+    ] {
+        let scene = load_scene(spec, &NffLimits::DEFAULT).unwrap();
+        assert_eq!((scene.name.as_str(), scene.objects.len()), (name, objects));
+    }
+}
+
+#[test]
 fn bad_names_of_built_in_scenes_are_refused() {
+    let names = "balls, gears, mount, rings, teapot, tetra, tree, lattice, jacks, shells, \
+                 sombrero, sample";
     for (spec, sentence) in [
-        ("spd:cubes:4", "spd:cubes:4: there is no built-in scene \"cubes\""),
-        ("spd:", "spd:: there is no built-in scene \"\""),
-        ("spd:balls:0", "spd:balls:0: expected a whole number from 1 for the size, found \"0\""),
+        ("spd:cubes:4", format!("expected a built-in scene ({names}), found \"cubes\"")),
+        ("spd:", format!("expected a built-in scene ({names}), found \"\"")),
+        ("spd:balls:0", "expected a size from 1 to 10 for balls, found \"0\"".to_owned()),
+        ("spd:balls:11", "expected a size from 1 to 10 for balls, found \"11\"".to_owned()),
+        ("spd:balls:-4", "expected a size from 1 to 10 for balls, found \"-4\"".to_owned()),
+        ("spd:balls:4:5", "expected a size from 1 to 10 for balls, found \"4:5\"".to_owned()),
+        ("spd:balls:", "expected a size from 1 to 10 for balls, found \"\"".to_owned()),
+        // Refused by its closed-form count, before anything is made.
         (
-            "spd:balls:4:5",
-            "spd:balls:4:5: expected a whole number from 1 for the size, found \"4:5\"",
+            "spd:tetra:15",
+            "expected at most 20000000 objects, found a scene of 1073741824".to_owned(),
         ),
     ] {
         let error = load_scene(spec, &NffLimits::DEFAULT).unwrap_err();
-        assert!(error.to_string().starts_with(sentence), "{error}");
+        assert_eq!(error.to_string(), format!("{spec}: {sentence}"));
         assert_eq!(error.fault(), Fault::Request);
     }
 }
