@@ -5,6 +5,7 @@
 //! written to a file as it is made, or merely counted.
 
 mod file;
+mod geometry;
 mod model;
 pub mod nff;
 mod sink;

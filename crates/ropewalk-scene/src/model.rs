@@ -1,7 +1,5 @@
 //! The scene model: what an NFF file can say, in double precision as written.
 
-use ropewalk::{Geometry, GeometryError};
-
 /// The view (`v`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -133,15 +131,4 @@ pub enum FacetPolicy {
     OneSided,
     /// Everything is two-sided: the SPD rule for the teapot.
     TwoSided,
-}
-
-impl Scene {
-    /// The primitives for the core, object `i` as primitive `i`, rounded to `f32`.
-    ///
-    /// # Errors
-    /// [`GeometryError`] names the first object that cannot be represented.
-    pub fn geometry(&self, policy: FacetPolicy) -> Result<Geometry, GeometryError> {
-        let _ = policy;
-        todo!("lands with the primitives")
-    }
 }

@@ -324,7 +324,8 @@ fn the_exact_sweep_predicts_less_than_the_sampled_planes_and_the_medians() {
         stats.predicted_inner_visits + stats.predicted_intersection_tests
     };
     let [spatial, object, sampled, exact] = [0, 1, 2, 3].map(|i| cost(MEASURES[i]));
-    assert!(exact < sampled && sampled < spatial && sampled < object);
+    // The sampled planes come without clipping, and so need not beat a clipped median.
+    assert!(exact < sampled && exact < spatial && exact < object);
 }
 
 #[test]

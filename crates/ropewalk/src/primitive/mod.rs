@@ -3,15 +3,75 @@
 //! A builder sees a primitive as a box, as the tight box of its part inside a cell, and as an area
 //! left of an axis plane; a traversal sees one ray test. Nothing else is asked of a primitive.
 
+mod cone;
+mod patch;
+mod planar;
+mod polygon;
 mod sphere;
 mod triangle;
 
+pub use cone::Cone;
+pub use patch::Patch;
+pub use polygon::{EDGE_TOLERANCE, Polygon};
 pub use sphere::Sphere;
 pub use triangle::Triangle;
 
 use crate::aabb::Aabb;
 use crate::ray::PreparedRay;
 use std::sync::Arc;
+
+/// Why a shape was refused.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShapeError {
+    /// A coordinate is NaN or infinite.
+    #[error("{what} {index} is ({}, {}, {}); every coordinate must be a finite f32", .found[0], .found[1], .found[2])]
+    NotFinite {
+        /// Which kind of point.
+        what: &'static str,
+        /// Its number, from 0.
+        index: usize,
+        /// Its value.
+        found: [f32; 3],
+    },
+    /// A radius is negative, NaN or infinite.
+    #[error("{what} is {found}; it must be finite and at least 0")]
+    BadRadius {
+        /// Which radius.
+        what: &'static str,
+        /// Its value.
+        found: f32,
+    },
+    /// A polygon of fewer than three vertices.
+    #[error("polygon has {found} vertices; it needs at least 3")]
+    TooFewVertices {
+        /// Number of vertices.
+        found: usize,
+    },
+    /// A patch whose normals do not match its vertices.
+    #[error("patch has {vertices} vertices and {found} normals; it needs one normal a vertex")]
+    NormalCount {
+        /// Number of vertices.
+        vertices: usize,
+        /// Number of normals.
+        found: usize,
+    },
+}
+
+fn check_points(what: &'static str, points: &[[f32; 3]]) -> Result<(), ShapeError> {
+    match points.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+        Some(index) => Err(ShapeError::NotFinite { what, index, found: points[index] }),
+        None => Ok(()),
+    }
+}
+
+fn check_radius(what: &'static str, found: f32) -> Result<(), ShapeError> {
+    if found.is_finite() && found >= 0.0 {
+        Ok(())
+    } else {
+        Err(ShapeError::BadRadius { what, found })
+    }
+}
 
 /// Which sides of a surface a ray can hit. The front is the side the normal points to: for
 /// triangles and polygons the side from which the vertices run counter-clockwise, for spheres and
@@ -50,6 +110,15 @@ pub struct Crossing {
     pub v: f32,
 }
 
+impl Crossing {
+    /// The crossing at `t`, rounded to `f32`, if that is finite and in the ray's range.
+    #[inline]
+    pub fn in_range(ray: &PreparedRay, t: f64) -> Option<Crossing> {
+        let t = t as f32;
+        (t.is_finite() && ray.accepts(t)).then_some(Crossing { t, u: 0.0, v: 0.0 })
+    }
+}
+
 /// The normals at a point of a primitive, in `f64`, unit length, pointing to the front.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceNormals {
@@ -59,11 +128,18 @@ pub struct SurfaceNormals {
     pub shading: [f64; 3],
 }
 
+/// How far from the surface a ray may pass and still be reported, as a share of the largest
+/// coordinate of ray origin and primitive: the bounds of the kernels' errors, each stated at its
+/// primitive, lie below 2^-45, and vertices of a polygon that miss its plane by less than 2^-40
+/// are taken as in it.
+pub const HIT_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
+
 /// What a builder and a traversal need to know of a shape.
 ///
 /// Contracts, all checked by the property tests of `ropewalk-testkit`:
-/// * `bounds` and `clipped_bounds` are rounded outward: no point of the surface that
-///   `intersect` can report lies outside.
+/// * `bounds` and `clipped_bounds` are rounded outward: no point of the surface lies outside.
+/// * The point at the exact parameter of a reported crossing lies within [`HIT_ERROR`] of the
+///   surface; its rounding to `f32` moves it along the ray by another `2^-24 t`.
 /// * `clipped_bounds(cell)` lies in `cell` and in `bounds`, and is `None` only if no point of the
 ///   surface touches the closed cell. It is tight for triangles and polygons ("perfect splits").
 /// * `intersect` returns the smallest accepted `t` in the ray's range on an accepted side.
@@ -80,6 +156,13 @@ pub trait Primitive: Send + Sync {
     /// Adds the primitive's part inside `cell` to the area functions of a plane that sweeps the
     /// cell along `axis` (see [`AreaRamp`]).
     fn area_ramps(&self, cell: &Aabb, axis: usize, out: &mut Vec<AreaRamp>);
+
+    /// One-sided area of the part inside the closed `cell`, to the accuracy of `area_ramps`.
+    fn area_in(&self, cell: &Aabb) -> f64 {
+        let mut ramps = Vec::new();
+        self.area_ramps(cell, 0, &mut ramps);
+        ramps.iter().map(|ramp| ramp.area_until(cell.extent(0))).sum()
+    }
 
     /// The first crossing in `ray.t_min ..= ray.t_max` on one of `sides`.
     fn intersect(&self, ray: &PreparedRay, sides: Sides) -> Option<Crossing>;
@@ -109,6 +192,15 @@ pub struct AreaRamp {
     pub slope: f64,
 }
 
+impl AreaRamp {
+    /// What this breakpoint adds to the area left of a plane at `t`, planes at `x` included.
+    #[inline]
+    pub fn area_until(&self, t: f64) -> f64 {
+        let d = t - self.x;
+        if d < 0.0 { 0.0 } else { self.step + d * (self.width + 0.5 * self.slope * d) }
+    }
+}
+
 /// A stored primitive. Large or rare kinds are boxed so that a triangle stays small.
 #[derive(Clone)]
 #[non_exhaustive]
@@ -117,8 +209,78 @@ pub enum Shape {
     Triangle(Triangle),
     /// A sphere.
     Sphere(Sphere),
+    /// A frustum of a cone or cylinder.
+    Cone(Cone),
+    /// A planar polygon.
+    Polygon(Box<Polygon>),
+    /// A polygon with normals.
+    Patch(Box<Patch>),
     /// Any other primitive.
     Custom(Arc<dyn Primitive>),
+}
+
+const _: () = assert!(size_of::<Shape>() <= 48);
+
+impl Shape {
+    /// A planar polygon; one of three vertices is stored as a triangle.
+    ///
+    /// # Errors
+    /// See [`Polygon::new`].
+    pub fn polygon(vertices: Vec<[f32; 3]>) -> Result<Shape, ShapeError> {
+        match <[[f32; 3]; 3]>::try_from(vertices) {
+            Ok(corners) => Triangle::new(corners).map(Shape::Triangle),
+            Err(vertices) => Polygon::new(vertices).map(Shape::from),
+        }
+    }
+
+    /// A custom primitive.
+    pub fn custom(primitive: impl Primitive + 'static) -> Shape {
+        Shape::Custom(Arc::new(primitive))
+    }
+
+    /// Checks the values that the public fields of a shape can hold: all finite, no negative
+    /// radius.
+    ///
+    /// # Errors
+    /// [`ShapeError`] as the shape's constructor returns it.
+    pub fn check(&self) -> Result<(), ShapeError> {
+        match self {
+            Shape::Triangle(p) => Triangle::new(p.vertices).map(drop),
+            Shape::Sphere(p) => Sphere::new(p.center, p.radius).map(drop),
+            Shape::Cone(p) => Cone::new(p.base, p.base_radius, p.apex, p.apex_radius).map(drop),
+            Shape::Polygon(_) | Shape::Patch(_) | Shape::Custom(_) => Ok(()),
+        }
+    }
+}
+
+impl From<Triangle> for Shape {
+    fn from(p: Triangle) -> Self {
+        Shape::Triangle(p)
+    }
+}
+
+impl From<Sphere> for Shape {
+    fn from(p: Sphere) -> Self {
+        Shape::Sphere(p)
+    }
+}
+
+impl From<Cone> for Shape {
+    fn from(p: Cone) -> Self {
+        Shape::Cone(p)
+    }
+}
+
+impl From<Polygon> for Shape {
+    fn from(p: Polygon) -> Self {
+        Shape::Polygon(Box::new(p))
+    }
+}
+
+impl From<Patch> for Shape {
+    fn from(p: Patch) -> Self {
+        Shape::Patch(Box::new(p))
+    }
 }
 
 macro_rules! each_shape {
@@ -126,6 +288,9 @@ macro_rules! each_shape {
         match $self {
             Shape::Triangle($p) => $body,
             Shape::Sphere($p) => $body,
+            Shape::Cone($p) => $body,
+            Shape::Polygon($p) => $body,
+            Shape::Patch($p) => $body,
             Shape::Custom($p) => $body,
         }
     };
@@ -143,6 +308,9 @@ impl Primitive for Shape {
     }
     fn area_ramps(&self, cell: &Aabb, axis: usize, out: &mut Vec<AreaRamp>) {
         each_shape!(self, p => p.area_ramps(cell, axis, out))
+    }
+    fn area_in(&self, cell: &Aabb) -> f64 {
+        each_shape!(self, p => p.area_in(cell))
     }
     #[inline]
     fn intersect(&self, ray: &PreparedRay, sides: Sides) -> Option<Crossing> {
