@@ -17,13 +17,23 @@ pub struct TreeShape {
     pub leaf_size: usize,
     /// Probability of a plane at a coordinate of a primitive's box or of the cell.
     pub aligned: f64,
+    /// Probability that a primitive which only touches the plane from one side is also referred to
+    /// from the other side.
+    pub generous: f64,
     /// Probability of splitting even a cell that needs no split.
     pub needless: f64,
 }
 
 impl Default for TreeShape {
     fn default() -> Self {
-        TreeShape { max_depth: 20, max_nodes: 2000, leaf_size: 2, aligned: 0.5, needless: 0.3 }
+        TreeShape {
+            max_depth: 20,
+            max_nodes: 2000,
+            leaf_size: 2,
+            aligned: 0.5,
+            generous: 0.3,
+            needless: 0.3,
+        }
     }
 }
 
@@ -63,11 +73,24 @@ impl Grower<'_> {
         }
         let (axis, split) = self.plane(&cell, &prims);
         let (below, above) = cell.split(axis, split);
-        let inside = |cell: &Aabb| {
-            let touches = |&id: &u32| self.geometry.shape(id).clipped_bounds(cell).is_some();
-            prims.iter().copied().filter(touches).collect::<Vec<_>>()
-        };
-        let (lower, upper) = (inside(&below), inside(&above));
+        let (mut lower, mut upper) = (Vec::new(), Vec::new());
+        for id in prims {
+            let shape = self.geometry.shape(id);
+            let (in_lower, in_upper) = (shape.clipped_bounds(&below), shape.clipped_bounds(&above));
+            // What lies in the plane itself lies in both closed cells: one reference is enough.
+            let mut keep = [in_lower.is_some(), in_upper.is_some()];
+            if keep == [true, true] && !self.draw.chance(self.shape.generous) {
+                let only_lower = in_upper.is_some_and(|b| b.max[axis] <= split);
+                let only_upper = in_lower.is_some_and(|b| b.min[axis] >= split);
+                keep = match (only_lower, only_upper) {
+                    (true, true) if self.draw.chance(0.5) => [true, false],
+                    (_, true) => [false, true],
+                    (only_lower, false) => [true, !only_lower],
+                };
+            }
+            lower.extend(keep[0].then_some(id));
+            upper.extend(keep[1].then_some(id));
+        }
         let parent = self.nodes.len();
         self.nodes.push(Node::leaf(0, 0));
         self.grow(below, lower, depth + 1);
