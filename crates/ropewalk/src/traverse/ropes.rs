@@ -98,10 +98,7 @@ fn walk<Q: Query, C: Counters>(
             break;
         }
         // 2. Test the leaf; it alone holds what lies before `alone_until`.
-        let refs = match tree.kind(cell.node) {
-            NodeKind::Leaf { first, count } => tree.leaf_refs(first, count),
-            NodeKind::Inner { .. } => break,
-        };
+        let refs = tree.leaf_refs(cell.first, cell.count);
         let stop = closed.test_leaf(geometry, refs, &mut query, counters);
         settled = exit.alone_until;
         if stop || settled > closed.to || ClosedRay::settled(&query, settled) {
