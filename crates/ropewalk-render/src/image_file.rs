@@ -9,6 +9,7 @@ use exr::prelude::{
     WritableImage,
 };
 use image::ImageEncoder;
+use ropewalk_scene::write_atomically;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
@@ -151,7 +152,8 @@ fn write_picture(
         ImageFormat::Exr => exr_bytes(image, aov),
     }
     .map_err(|reason| ImageFileError::Encode { path: path.into(), reason })?;
-    write_whole(path, &bytes).map_err(|source| ImageFileError::Io { path: path.into(), source })
+    write_atomically(path, |out| out.write_all(&bytes))
+        .map_err(|source| ImageFileError::Io { path: path.into(), source })
 }
 
 fn png_bytes(image: &Image) -> Result<Vec<u8>, String> {
@@ -199,18 +201,4 @@ fn folder_of(path: &Path) -> &Path {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     }
-}
-
-/// Writes a file under a temporary name beside its own and renames it when it is complete.
-fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = folder_of(path).join(format!(".{name}.{}.tmp", std::process::id()));
-    let written = std::fs::File::create(&temporary)
-        .and_then(|mut file| file.write_all(bytes))
-        .and_then(|()| std::fs::rename(&temporary, path));
-    if written.is_err() {
-        // The first error is the one to report; there may be nothing to remove.
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written
 }
