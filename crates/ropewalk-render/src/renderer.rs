@@ -9,7 +9,7 @@ use crate::ray_counts::RayCounts;
 use crate::sampling::sample_in_pixel;
 use crate::settings::RenderSettings;
 use crate::view::{View, default_camera};
-use crate::whitted::{EyeSample, Whitted};
+use crate::whitted::{EyeSample, FacingRule, Whitted};
 use rayon::prelude::*;
 use ropewalk::Geometry;
 use ropewalk::traverse::{Counts, NoCounts, RayCaster};
@@ -137,7 +137,9 @@ impl<'a, A: RayCaster> Frame<'a, A> {
         check_objects(scene, geometry)?;
         let lighting = Lighting::new(scene, view.eye());
         let max_depth = settings.max_depth;
-        let tracer = Whitted { scene, geometry, caster, lighting, max_depth };
+        let facing =
+            if settings.spd_rules { FacingRule::SurfaceNormal } else { FacingRule::ViewerSide };
+        let tracer = Whitted { scene, geometry, caster, lighting, max_depth, facing };
         Ok(Frame { tracer, view, size, settings })
     }
 

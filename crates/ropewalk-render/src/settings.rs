@@ -23,7 +23,8 @@ pub struct RenderSettings {
     /// places in each render. Ignored under `spd_rules`.
     pub samples_per_pixel: u32,
     /// Eye rays through the `(w + 1) x (h + 1)` corners of pixels; a pixel is the mean of its four
-    /// corners (SPD, testing procedure 6).
+    /// corners (SPD, testing procedure 6). Also decides by the surface's own normal, not by the one
+    /// on the viewer's side, which lights get a shadow ray (procedure 10).
     pub spd_rules: bool,
     /// Deepest level of the tree of rays; the eye ray is level 1 (SPD, testing procedure 7).
     pub max_depth: u32,

@@ -20,6 +20,18 @@ pub(crate) struct Whitted<'a, A> {
     pub lighting: Lighting,
     /// Deepest level; the eye ray is level 1.
     pub max_depth: u32,
+    pub facing: FacingRule,
+}
+
+/// Which normal decides whether a surface faces a light, and so whether a shadow ray is shot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FacingRule {
+    /// The surface's own normal, from whichever side it is seen: "a shadow ray is not generated if
+    /// the surface normal points away from the light; this is true even on transmitting surfaces"
+    /// (SPD, testing procedure 10).
+    SurfaceNormal,
+    /// The normal turned to the viewer, which lights the side that is seen.
+    ViewerSide,
 }
 
 /// What an eye ray brings back.
@@ -117,7 +129,8 @@ impl<A: RayCaster> Whitted<'_, A> {
         color
     }
 
-    /// Light from one light; a shadow ray is shot only if the surface faces it.
+    /// Light from one light; a shadow ray is shot only if the surface faces it. Where the rule
+    /// shoots one to a light on the far side of the surface, it counts but brings no light.
     fn light<O: Observer>(
         &self,
         point: &SurfacePoint,
@@ -127,7 +140,7 @@ impl<A: RayCaster> Whitted<'_, A> {
         let Some(to_light) = unit(sub(light.position, point.position)) else {
             return [0.0; 3];
         };
-        if !faces(point, to_light) {
+        if !self.faces(point, to_light) {
             return [0.0; 3];
         }
         let ray = shadow_ray(point, light);
@@ -138,6 +151,15 @@ impl<A: RayCaster> Whitted<'_, A> {
         }
         let to_viewer = scale(point.arriving, -1.0);
         direct(point.material, light.intensity, point.shading, to_light, to_viewer)
+    }
+
+    /// Whether the shading normal, taken by the facing rule, points to the light's side.
+    fn faces(&self, point: &SurfacePoint, to_light: Vec3) -> bool {
+        let cosine = dot(point.shading, to_light);
+        match self.facing {
+            FacingRule::SurfaceNormal if !point.outside => cosine < 0.0,
+            _ => cosine > 0.0,
+        }
     }
 }
 
@@ -155,12 +177,6 @@ fn reflects(material: &Material) -> bool {
 /// SPD, testing procedure 9.
 fn transmits(material: &Material) -> bool {
     material.transmittance > 0.0
-}
-
-/// SPD, testing procedure 10: a shadow ray is shot only if the surface does not point away from
-/// the light, transmitting or not. The normal is the one that shades, on the viewer's side.
-fn faces(point: &SurfacePoint, to_light: Vec3) -> bool {
-    dot(point.shading, to_light) > 0.0
 }
 
 /// From the surface to the light and no further: the direction is the whole way, `t` ends at 1.
