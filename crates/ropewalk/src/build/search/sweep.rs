@@ -2,7 +2,7 @@
 
 use super::{NodeView, PlaneSearch, SearchBuffers};
 use crate::build::blockage::{AreaSweep, Blockage, ends_of_sides};
-use crate::build::event::Event;
+use crate::build::event::{Event, EventKind};
 use crate::build::plane::{CellAreas, Counts, Plane, Pricing};
 use crate::cost::CostModel;
 
@@ -72,15 +72,20 @@ impl<M: CostModel> Sweep<'_, M> {
         best: &mut Shortlist,
     ) {
         let &Candidate { areas, axis, position, counts, count } = candidate;
-        let sides = if counts.planar > 0 { &[true, false][..] } else { &[true][..] };
-        for &planar_left in sides {
+        let mut offer = |planar_left: bool| {
             let (left, right) = counts.children(planar_left);
             if !areas.makes_progress(position, left, right, count) {
-                continue;
+                return;
             }
             let (p, children) = (ends(planar_left), (left, right));
             let cost = self.pricing.price(&self.model, areas, position, children, p);
-            best.offer(Plane { axis, position, planar_left, cost, left, right });
+            if cost < best.limit {
+                best.insert(Plane { axis, position, planar_left, cost, left, right });
+            }
+        };
+        offer(true);
+        if counts.planar > 0 {
+            offer(false);
         }
     }
 
@@ -155,7 +160,14 @@ impl Shortlist {
         }
     }
 
+    /// Takes a plane that costs less than the limit.
     fn insert(&mut self, plane: Plane) {
+        if self.capacity == 1 {
+            self.limit = plane.cost;
+            self.planes.clear();
+            self.planes.push(plane);
+            return;
+        }
         self.planes.truncate(self.capacity - 1);
         let at = self.planes.partition_point(|p| p.cost <= plane.cost);
         self.planes.insert(at, plane);
@@ -171,13 +183,15 @@ fn for_each_position(events: &[Event], fragments: usize, mut visit: impl FnMut(f
     let (mut left, mut right) = (0, fragments);
     let mut i = 0;
     while i < events.len() {
-        let first = events[i];
-        let mut kinds = [0usize; 4];
-        while i < events.len() && events[i].position_key() == first.position_key() {
-            kinds[events[i].kind_index()] += 1;
+        let (first, start) = (events[i], i);
+        // Counted without branches: the kinds come at random.
+        let (mut ends, mut starts) = (0, 0);
+        while let Some(event) = events.get(i).filter(|e| e.position_key() == first.position_key()) {
+            ends += usize::from(event.kind_index() == EventKind::End as usize);
+            starts += usize::from(event.kind_index() == EventKind::Start as usize);
             i += 1;
         }
-        let [ends, planar, starts, _] = kinds;
+        let planar = i - start - ends - starts;
         right -= ends + planar;
         visit(first.position(), Counts { left, planar, right });
         left += starts + planar;
