@@ -1,10 +1,11 @@
-//! What each walk costs on a soup of small triangles: counted events and time per ray.
+//! What each walk costs on a soup of small triangles: counted events and time per ray; rope walks
+//! also with a known start leaf (marked +).
 //!
 //! `cargo run --release -p ropewalk --example walks [TRIANGLES [RAYS]]`
 
 use ropewalk::build::build_default;
 use ropewalk::primitive::Triangle;
-use ropewalk::traverse::{Counts, NoCounts, RayCaster};
+use ropewalk::traverse::{Counts, LeafId, NoCounts};
 use ropewalk::{Accelerator, Geometry, Ray, Sides, Walk};
 use ropewalk_testkit::rays::Draw;
 use std::sync::Arc;
@@ -44,11 +45,13 @@ fn outer_rays(draw: &mut Draw, count: usize) -> Vec<Ray> {
 
 /// Nanoseconds per ray: the best of seven rounds for each batch of 500 rays, so that other work on
 /// the machine disturbs little.
-fn nanoseconds(accelerator: &Accelerator, rays: &[Ray]) -> f64 {
-    let batch = |rays: &[Ray]| {
+fn nanoseconds(accelerator: &Accelerator, rays: &[(Ray, Option<LeafId>)]) -> f64 {
+    let batch = |rays: &[(Ray, Option<LeafId>)]| {
         let round = |_| {
             let start = Instant::now();
-            let hits = rays.iter().filter_map(|ray| accelerator.closest_hit(ray, &mut NoCounts));
+            let hits = rays.iter().filter_map(|(ray, start)| {
+                accelerator.closest_hit_from(ray, *start, &mut NoCounts).0
+            });
             std::hint::black_box(hits.map(|hit| hit.t).sum::<f32>());
             start.elapsed().as_nanos()
         };
@@ -83,19 +86,34 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "thread"
         );
         let mut expected = None;
-        for walk in [Walk::SungShirley, Walk::TaB, Walk::Ropes, Walk::RopeTrees] {
+        let runs = [
+            (Walk::SungShirley, false),
+            (Walk::TaB, false),
+            (Walk::Ropes, false),
+            (Walk::RopeTrees, false),
+            (Walk::Ropes, true),
+            (Walk::RopeTrees, true),
+        ];
+        for (walk, known) in runs {
+            if known && name != "inner" {
+                continue;
+            }
             let start = Instant::now();
             let accelerator = Accelerator::new(geometry.clone(), tree.clone(), walk)?;
             let threading = start.elapsed().as_secs_f64() * 1e3;
+            let start = |ray: &Ray| accelerator.locate(ray.origin).filter(|_| known);
+            let rays: Vec<_> = rays.iter().map(|ray| (*ray, start(ray))).collect();
             let mut counts = Counts::default();
-            let hits: Vec<_> =
-                rays.iter().map(|ray| accelerator.closest_hit(ray, &mut counts)).collect();
+            let hits: Vec<_> = rays
+                .iter()
+                .map(|(ray, start)| accelerator.closest_hit_from(ray, *start, &mut counts).0)
+                .collect();
             assert!(expected.get_or_insert_with(|| hits.clone()) == &hits, "{walk:?} differs");
             let best = nanoseconds(&accelerator, &rays);
             let per_ray = |events: u64| events as f64 / rays.len() as f64;
             println!(
                 "{:14} {:7.3} {:7.3} {:7.3} {:7.3} {:7.3} {:8.3} {:7.5} {:7.0} {:7.1} {:5.1} ms",
-                walk.name(),
+                format!("{}{}", walk.name(), if known { " +" } else { "" }),
                 per_ray(counts.intersection_tests),
                 per_ray(counts.traversal_steps),
                 per_ray(counts.leaf_visits),

@@ -21,8 +21,8 @@ pub(crate) struct ClosedRay {
     pub ray: PreparedRay,
     /// Slack in units of length.
     pub slack: f64,
-    /// Slack in units of `t` against a plane of each axis: `slack * |inv|`, infinite where `dir`
-    /// is zero.
+    /// Slack in units of `t` against a plane of each axis: `slack * |inv|`, and 0 where `dir` is
+    /// zero, for such planes are never crossed.
     pub t_slack: [f64; 3],
     /// Where the walk begins: no accepted hit lies before it.
     pub from: f64,
@@ -44,7 +44,7 @@ impl ClosedRay {
         // A hit is accepted by its rounded t, so the exact t may lie half a step outside.
         let from = f64::from(ray.t_min.next_down());
         let to = f64::from(ray.t_max.next_up());
-        let t_slack = prepared.inv.map(|inv| slack * inv.abs());
+        let t_slack = prepared.inv.map(|inv| if inv.is_finite() { slack * inv.abs() } else { 0.0 });
         let mut closed = ClosedRay { ray: prepared, slack, t_slack, from, to };
         for axis in 0..3 {
             let [low, high] = [bounds.min[axis], bounds.max[axis]].map(f64::from);

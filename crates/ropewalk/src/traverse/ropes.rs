@@ -212,24 +212,22 @@ fn begins_inside(closed: &ClosedRay, bounds: &Aabb) -> bool {
 /// The nearest of the three planes ahead. `None` where a parallel ray runs in a plane of the leaf.
 #[inline]
 fn exit(closed: &ClosedRay, bounds: &Aabb) -> Option<Exit> {
-    let (mut axis, mut t) = (0, f64::INFINITY);
-    let mut first = [f64::INFINITY; 3];
-    for a in 0..3 {
-        if closed.is_parallel(a) {
-            clear_of_parallel(closed, bounds, a).ok()?;
-            continue;
-        }
-        let (_, ahead) = planes(closed, bounds, a);
-        let t_plane = closed.t_at(a, ahead);
-        first[a] = t_plane - closed.t_slack[a];
-        if t_plane < t {
-            (axis, t) = (a, t_plane);
-        }
+    for a in (0..3).filter(|&a| closed.is_parallel(a)) {
+        clear_of_parallel(closed, bounds, a).ok()?;
     }
+    let ahead: [f64; 3] = std::array::from_fn(|a| match closed.is_parallel(a) {
+        true => f64::INFINITY,
+        false => closed.t_at(a, planes(closed, bounds, a).1),
+    });
+    let mut axis = usize::from(ahead[1] < ahead[0]);
+    axis = if ahead[2] < ahead[axis] { 2 } else { axis };
+    let t = ahead[axis];
+    // The bands of all three planes: one may begin before that of the exit ends, its own.
+    let first: [f64; 3] = std::array::from_fn(|a| ahead[a] - closed.t_slack[a]);
     let last = t + closed.t_slack[axis];
-    let degenerate = (0..3).any(|a| a != axis && first[a] <= last);
+    let near: u32 = first.map(|first| u32::from(first <= last)).into_iter().sum();
     let alone_until = first[0].min(first[1]).min(first[2]);
-    Some(Exit { axis, t, alone_until, degenerate })
+    Some(Exit { axis, t, alone_until, degenerate: near != 1 })
 }
 
 /// How far, per axis, a crossing of a plane of `axis` must stay clear of other planes: the slack
