@@ -100,7 +100,7 @@ pub fn grid_ray(draw: &mut Draw, n: i32) -> Ray {
                 dir
             }
             1 => draw.grid_point(1),
-            _ => std::array::from_fn(|_| [-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0][draw.below(7)]),
+            _ => draw.grid_point(4),
         };
         if dir != [0.0; 3] {
             return Ray::new(origin, dir);

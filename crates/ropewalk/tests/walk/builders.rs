@@ -64,7 +64,8 @@ fn every_measure() {
             let scenes = [
                 scenes::soup(draw, 200, 1.0),
                 scenes::exponent_soup(draw, 100, -8.0, 8.0),
-                scenes::mixed(draw, 150),
+                scenes::mixed(draw, 150, false),
+                scenes::mixed(draw, 80, true),
                 scenes::grid_soup(draw, 120, 4),
                 scenes::grid_quads(draw, 80, 4),
                 scenes::flat(draw, 40, round % 3),

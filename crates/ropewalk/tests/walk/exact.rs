@@ -39,8 +39,9 @@ fn soups_in_exponent_space() {
 }
 
 #[test]
-fn spheres_and_soup() {
-    each_bench(3, |d| scenes::mixed(d, 150), usual_rays);
+fn all_kinds_of_primitives() {
+    each_bench(3, |d| scenes::mixed(d, 150, false), usual_rays);
+    each_bench(50, |d| scenes::mixed(d, 100, true), usual_rays);
 }
 
 #[test]

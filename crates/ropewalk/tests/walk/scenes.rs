@@ -1,6 +1,6 @@
-//! Scenes of triangles and spheres, small enough for brute force.
+//! Scenes of all primitives, small enough for brute force.
 
-use ropewalk::primitive::{Sphere, Triangle};
+use ropewalk::primitive::{Cone, Patch, Polygon, Sphere, Triangle};
 use ropewalk::{Geometry, Shape, Sides};
 use ropewalk_testkit::rays::Draw;
 
@@ -41,16 +41,55 @@ pub fn exponent_soup(draw: &mut Draw, count: usize, low: f64, high: f64) -> Geom
     geometry
 }
 
-/// Triangles and spheres.
-pub fn mixed(draw: &mut Draw, count: usize) -> Geometry {
-    let mut geometry = soup(draw, count / 2, 1.0);
-    for _ in 0..count - count / 2 {
-        let center = std::array::from_fn(|_| draw.uniform(0.0, 1.0) as f32);
-        let radius = draw.uniform(-7.0, -2.0).exp2() as f32;
+/// All kinds of primitives in the unit cube. On a grid, coordinates and radii are multiples of 1/8.
+pub fn mixed(draw: &mut Draw, count: usize, grid: bool) -> Geometry {
+    let snap = move |x: f64| if grid { (8.0 * x).round() / 8.0 } else { x } as f32;
+    let mut geometry = Geometry::new();
+    for kind in 0..count {
         let sides = any_sides(draw);
-        push(&mut geometry, Sphere { center, radius }, sides);
+        let reach = if grid { 0.5 } else { draw.uniform(-5.0, -1.0).exp2() };
+        let center: [f64; 3] = std::array::from_fn(|_| draw.uniform(0.0, 1.0));
+        let around = |d: &mut Draw| center.map(|c| snap(c + d.uniform(-reach, reach)));
+        let radius = snap(reach * draw.uniform(0.25, 0.5)).max(1e-3);
+        match kind % 5 {
+            0 => {
+                let vertices = std::array::from_fn(|_| around(draw));
+                push(&mut geometry, Triangle { vertices }, sides);
+            }
+            1 => push(&mut geometry, Sphere { center: center.map(snap), radius }, sides),
+            2 => {
+                let (base, apex) = (around(draw), around(draw));
+                let other = if draw.chance(0.5) { radius } else { 0.0 };
+                push(&mut geometry, Cone::new(base, radius, apex, other).unwrap(), sides);
+            }
+            3 => push(&mut geometry, Polygon::new(star(draw, center, reach, snap)).unwrap(), sides),
+            _ => {
+                let vertices = star(draw, center, reach, snap);
+                let normals = vertices.iter().map(|_| draw.direction()).collect();
+                push(&mut geometry, Patch::new(vertices, normals).unwrap(), sides);
+            }
+        }
     }
     geometry
+}
+
+/// The corners of a star-shaped polygon, mostly concave, in a plane of one constant coordinate or
+/// in one at 45 degrees to two axes; exactly planar on a grid.
+fn star(draw: &mut Draw, center: [f64; 3], reach: f64, snap: impl Fn(f64) -> f32) -> Vec<[f32; 3]> {
+    let (axis, corners, oblique) = (draw.below(3), 3 + draw.below(6), draw.chance(0.5));
+    let corner = |i: usize| {
+        let angle = std::f64::consts::TAU * i as f64 / corners as f64;
+        let r = reach * draw.uniform(0.2, 1.0);
+        let mut p = center;
+        p[(axis + 1) % 3] += r * angle.cos();
+        p[(axis + 2) % 3] += r * angle.sin();
+        let mut p = p.map(&snap);
+        if oblique {
+            p[axis] += p[(axis + 1) % 3];
+        }
+        p
+    };
+    (0..corners).map(corner).collect()
 }
 
 /// Triangles with integer vertices in `-n ..= n`, degenerate ones and copies included.
