@@ -4,6 +4,7 @@ mod command;
 mod engine;
 mod interrupt;
 mod output;
+mod paper;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -26,6 +27,8 @@ enum Command {
     Stats(command::stats::Args),
     /// Check every invariant of a scene's tree, ropes and rope trees
     Validate(command::validate::Args),
+    /// Run the experiment of the 1997 paper and write its report
+    Paper(paper::Args),
 }
 
 fn main() -> ExitCode {
@@ -35,6 +38,7 @@ fn main() -> ExitCode {
         Command::Scene(args) => command::scene::run(&args),
         Command::Stats(args) => command::stats::run(&args),
         Command::Validate(args) => command::validate::run(&args),
+        Command::Paper(args) => paper::run(&args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,0 +1,83 @@
+//! The claim and what was measured.
+
+use crate::paper::model::Experiment;
+use crate::paper::report::chart;
+use crate::paper::report::html::{Cell, Table, escape, figure, paragraph};
+use crate::paper::verdict::{HeadlineFigures, percent};
+
+/// Title, big numbers, one paragraph, the ratio on each scene.
+pub fn headline(experiment: &Experiment) -> String {
+    let headline = &experiment.headline;
+    let mut html = format!(
+        "<h1>Surface-area BSP trees with rope trees: the 1997 experiment</h1>\n\
+         <p class=\"sub\">{} scenes of the Standard Procedural Databases at {} size, {}. \
+         ropewalk {}, {}.</p>\n",
+        experiment.scenes.len(),
+        experiment.size,
+        escape(&experiment.machine.cpu),
+        experiment.version,
+        experiment.date
+    );
+    let Some(combined) = &headline.combined else { return html };
+    html += "<div class=\"big\">\n";
+    let mut big = |ratio: f64, what: &str| {
+        html += &format!("<div><b>{}</b><span>{what}</span></div>\n", percent(ratio));
+    };
+    big(combined.operations.mean, "operations, all ingredients against the reference");
+    big(combined.time.mean, "time of a ray");
+    big(combined.size.mean, "size of the tree");
+    if let Some(best) = &headline.best {
+        big(best.operations.mean, "operations, best tree (ended by cost)");
+    }
+    html += "</div>\n";
+    html += &paragraph(&headline.sentence);
+    html += &paragraph(
+        "An operation is an intersection test or a visit of an inner node, counted alike. The \
+         reference is MacDonald and Booth's 1990 tree from nine sampled planes on each axis, walked \
+         as Sung and Shirley do. Both sides end at leaves of two or at depth 1.2 log2 N + 2.",
+    );
+    html += "<div class=\"charts\">\n";
+    html += &chart_of_scenes(experiment);
+    html += "</div>\n";
+    html += &means(
+        headline.combined.as_ref(),
+        headline.combined_to_exact.as_ref(),
+        headline.best.as_ref(),
+    );
+    html
+}
+
+fn chart_of_scenes(experiment: &Experiment) -> String {
+    let find = |name: &str| experiment.verdicts.iter().find(|v| v.method == name);
+    let series: Vec<_> = ["macdonald-booth", "combined", "best"]
+        .into_iter()
+        .filter_map(|name| Some((name, find(name)?.operations.as_ref()?)))
+        .collect();
+    let svg = chart::scene_bars(&series, "Operations of each scene over those of the reference");
+    figure(&svg, "Operations a ray over those of the reference, scene by scene; below 1 is better.")
+}
+
+fn means(
+    combined: Option<&HeadlineFigures>,
+    to_exact: Option<&HeadlineFigures>,
+    best: Option<&HeadlineFigures>,
+) -> String {
+    let mut table = Table::new(
+        "Means of the ratios over the scenes",
+        &["", "operations", "geometric", "time", "geometric", "size", "geometric"],
+    );
+    let rows = [
+        ("combined / reference", combined),
+        ("combined / exact sweep", to_exact),
+        ("best / reference", best),
+    ];
+    for (name, figures) in rows {
+        let Some(f) = figures else { continue };
+        let mut cells = vec![Cell::text(name)];
+        for s in [&f.operations, &f.time, &f.size] {
+            cells.extend([Cell::ratio(Some(s.mean)), Cell::value(Some(s.geometric_mean), 3)]);
+        }
+        table.row("", &cells);
+    }
+    table.finish()
+}

@@ -1,0 +1,408 @@
+//! What each ingredient is worth, in numbers and in one plain sentence.
+
+use super::model::{MethodResult, Ratios, SceneResult};
+use super::published::PAPER_SAVING;
+use super::statistics::{geometric_mean, mean};
+use ropewalk::method::Method;
+use serde::Serialize;
+
+/// A mean within this share of 1 counts as no change.
+pub const NO_CHANGE: f64 = 0.02;
+
+/// The direction of a ratio.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Effect {
+    /// More than [`NO_CHANGE`] below 1.
+    Saves,
+    /// Within [`NO_CHANGE`] of 1.
+    Nothing,
+    /// More than [`NO_CHANGE`] above 1.
+    Costs,
+}
+
+impl Effect {
+    /// The direction of `ratio`.
+    pub fn of(ratio: f64) -> Self {
+        if ratio < 1.0 - NO_CHANGE {
+            Effect::Saves
+        } else if ratio > 1.0 + NO_CHANGE {
+            Effect::Costs
+        } else {
+            Effect::Nothing
+        }
+    }
+}
+
+/// A ratio on one scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SceneRatio {
+    /// Scene.
+    pub scene: String,
+    /// Ratio; below 1 is better.
+    pub ratio: f64,
+}
+
+/// One figure's ratio over the scenes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Arithmetic mean of the ratios.
+    pub mean: f64,
+    /// Geometric mean of the ratios.
+    pub geometric_mean: f64,
+    /// Direction of the arithmetic mean.
+    pub effect: Effect,
+    /// One ratio a scene.
+    pub scenes: Vec<SceneRatio>,
+}
+
+impl Summary {
+    /// Sums up; `None` without scenes.
+    pub fn new(scenes: Vec<SceneRatio>) -> Option<Self> {
+        if scenes.is_empty() {
+            return None;
+        }
+        let ratios: Vec<_> = scenes.iter().map(|s| s.ratio).collect();
+        let mean = mean(&ratios);
+        let geometric_mean = geometric_mean(&ratios);
+        Some(Summary { mean, geometric_mean, effect: Effect::of(mean), scenes })
+    }
+
+    /// The scenes on which the ratio is worse than no change, worst first.
+    pub fn losses(&self) -> Vec<&SceneRatio> {
+        let mut losses: Vec<_> =
+            self.scenes.iter().filter(|s| Effect::of(s.ratio) == Effect::Costs).collect();
+        losses.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
+        losses
+    }
+}
+
+/// What one method is worth against the one that it is to be held against.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verdict {
+    /// Method.
+    pub method: &'static str,
+    /// What it is.
+    pub title: &'static str,
+    /// Its role.
+    pub role: &'static str,
+    /// The method it is compared with.
+    pub against: &'static str,
+    /// Intersection tests and traversal steps.
+    pub operations: Option<Summary>,
+    /// Rope crossings and rope-tree steps added; only where ropes are walked.
+    pub all_steps: Option<Summary>,
+    /// Time of a ray.
+    pub time: Option<Summary>,
+    /// Inner nodes and references.
+    pub size: Option<Summary>,
+    /// The verdict in words.
+    pub sentence: String,
+}
+
+impl Verdict {
+    /// The figures that are drawn, in order, with their names.
+    pub fn figures(&self) -> impl Iterator<Item = (&'static str, &Summary)> {
+        [
+            ("operations", &self.operations),
+            ("all steps", &self.all_steps),
+            ("time", &self.time),
+            ("size", &self.size),
+        ]
+        .into_iter()
+        .filter_map(|(name, summary)| Some((name, summary.as_ref()?)))
+    }
+}
+
+/// The method that `method` is held against: an ingredient against the exact sweep to which it was
+/// added, ropes on the combined tree against that tree walked from the root, all else against the
+/// paper's reference.
+pub fn opponent(method: &MethodResult) -> Option<&'static str> {
+    match method.role {
+        "reference" => None,
+        "ingredient" => Some(Method::EXACT),
+        "combined" if method.roped => Some("combined"),
+        _ => Some(Method::REFERENCE),
+    }
+}
+
+/// The verdicts on all methods but the reference and the naive search, in the order of the report.
+pub fn judge(scenes: &[SceneResult]) -> Vec<Verdict> {
+    let Some(first) = scenes.first() else { return Vec::new() };
+    first
+        .methods
+        .iter()
+        .filter(|m| m.size > 0)
+        .filter_map(|m| Some(verdict(m, opponent(m)?, scenes)))
+        .collect()
+}
+
+fn verdict(method: &MethodResult, against: &'static str, scenes: &[SceneResult]) -> Verdict {
+    let figure = |pick: fn(&Ratios) -> Option<f64>| summary(scenes, method.name, against, pick);
+    let mut verdict = Verdict {
+        method: method.name,
+        title: method.title,
+        role: method.role,
+        against,
+        operations: figure(|r| r.operations),
+        all_steps: if method.roped { figure(|r| r.all_steps) } else { None },
+        time: figure(|r| r.time),
+        size: figure(|r| r.size),
+        sentence: String::new(),
+    };
+    verdict.sentence = sentence(&verdict);
+    verdict
+}
+
+/// The ratio `pick` of `method` to `against` over all scenes that have both.
+pub fn summary(
+    scenes: &[SceneResult],
+    method: &str,
+    against: &str,
+    pick: fn(&Ratios) -> Option<f64>,
+) -> Option<Summary> {
+    let ratios = scenes.iter().filter_map(|scene| {
+        let ratio = pick(&Ratios::new(scene.method(method)?, scene.method(against)?))?;
+        Some(SceneRatio { scene: scene.name.clone(), ratio })
+    });
+    Summary::new(ratios.collect())
+}
+
+/// A ratio as a change in per cent, such as `-12.3 %`.
+pub fn percent(ratio: f64) -> String {
+    let change = 100.0 * (ratio - 1.0);
+    if change < 0.0 { format!("\u{2212}{:.1} %", -change) } else { format!("+{change:.1} %") }
+}
+
+/// The verdict in words: what is saved, what is not, and where it loses.
+fn sentence(verdict: &Verdict) -> String {
+    let figures: Vec<_> = verdict.figures().collect();
+    let share = |s: &Summary| format!("{:.1} %", 100.0 * (s.mean - 1.0).abs());
+    let listed = |effect| {
+        let all = figures.iter().filter(move |(_, s)| s.effect == effect);
+        all.map(|(name, s)| match effect {
+            Effect::Saves => format!("{} of {}", share(s), saved_words(name)),
+            Effect::Costs => paid_words(name, &share(s)),
+            Effect::Nothing => (*name).to_owned(),
+        })
+        .collect::<Vec<_>>()
+    };
+    let (saved, paid, same) =
+        (listed(Effect::Saves), listed(Effect::Costs), listed(Effect::Nothing));
+    let mut text = match (saved.is_empty(), paid.is_empty()) {
+        (true, true) => format!("Brings nothing: {} within 2 %", join(&same)),
+        (false, true) => format!("Saves {}", join(&saved)),
+        (true, false) => format!("Saves nothing and costs {}", join(&paid)),
+        (false, false) => format!("Saves {}, but costs {}", join(&saved), join(&paid)),
+    };
+    let changed = !saved.is_empty() || !paid.is_empty();
+    if changed && !same.is_empty() {
+        text += &format!("; {} unchanged", join(&same));
+    }
+    text.push('.');
+    for (name, summary) in &figures {
+        text += &losses(name, summary);
+    }
+    text
+}
+
+/// Where a figure that is saved or unchanged on the mean is lost all the same.
+fn losses(name: &str, summary: &Summary) -> String {
+    let losses = summary.losses();
+    if losses.is_empty() || summary.scenes.len() == 1 {
+        return String::new();
+    }
+    if losses.len() == summary.scenes.len() {
+        return format!(" Loses in {name} on every scene.");
+    }
+    let list: Vec<_> =
+        losses.iter().map(|s| format!("{} ({})", s.scene, percent(s.ratio))).collect();
+    format!(" Loses in {name} on {}.", join(&list))
+}
+
+fn saved_words(name: &str) -> String {
+    if name == "all steps" { name.to_owned() } else { format!("the {name}") }
+}
+
+fn paid_words(name: &str, share: &str) -> String {
+    match name {
+        "size" => format!("a tree {share} larger"),
+        "all steps" => format!("{share} more steps in all"),
+        _ => format!("{share} more {name}"),
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn join(words: &[String]) -> String {
+    match words {
+        [] => String::new(),
+        [one] => one.clone(),
+        [most @ .., last] => format!("{} and {last}", most.join(", ")),
+    }
+}
+
+/// The claim of the paper beside what was measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct Headline {
+    /// The combination against the reference.
+    pub combined: Option<HeadlineFigures>,
+    /// The combination against the exact sweep.
+    pub combined_to_exact: Option<HeadlineFigures>,
+    /// The best tree against the reference.
+    pub best: Option<HeadlineFigures>,
+    /// What the paper says it saves of the operations, smallest and largest.
+    pub paper_saving: [f64; 2],
+    /// The headline in words.
+    pub sentence: String,
+}
+
+/// Means over the scenes.
+#[derive(Clone, Debug, Serialize)]
+pub struct HeadlineFigures {
+    /// Intersection tests and traversal steps.
+    pub operations: Summary,
+    /// Time of a ray.
+    pub time: Summary,
+    /// Inner nodes and references.
+    pub size: Summary,
+}
+
+impl Headline {
+    /// From all scenes.
+    pub fn new(scenes: &[SceneResult]) -> Self {
+        let against = |method: &str, against: &str| {
+            Some(HeadlineFigures {
+                operations: summary(scenes, method, against, |r| r.operations)?,
+                time: summary(scenes, method, against, |r| r.time)?,
+                size: summary(scenes, method, against, |r| r.size)?,
+            })
+        };
+        let combined = against("combined", Method::REFERENCE);
+        Headline {
+            sentence: combined.as_ref().map(headline_sentence).unwrap_or_default(),
+            combined,
+            combined_to_exact: against("combined", Method::EXACT),
+            best: against(Method::DEFAULT, Method::REFERENCE),
+            paper_saving: [*PAPER_SAVING.start(), *PAPER_SAVING.end()],
+        }
+    }
+}
+
+fn headline_sentence(figures: &HeadlineFigures) -> String {
+    let saved = 1.0 - figures.operations.mean;
+    let whole = |share: f64| format!("{:.1} %", 100.0 * share.abs());
+    let place = match &figures.operations.scenes[..] {
+        [one] => format!("on {}", one.scene),
+        many => format!("on the mean of {} scenes", many.len()),
+    };
+    let claim = if saved < *PAPER_SAVING.start() {
+        "less than the 20 to 38 % of the paper"
+    } else if saved > *PAPER_SAVING.end() {
+        "more than the 20 to 38 % of the paper"
+    } else {
+        "inside the 20 to 38 % of the paper"
+    };
+    let word = |ratio: f64, less: &str, more: &str| {
+        format!("{} {}", whole(ratio - 1.0), if ratio <= 1.0 { less } else { more })
+    };
+    format!(
+        "All ingredients together need {} than the reference {place}: {claim}. A ray takes {} \
+         time, and the tree is {}.",
+        word(figures.operations.mean, "fewer operations", "more operations"),
+        word(figures.time.mean, "less", "more"),
+        word(figures.size.mean, "smaller", "larger"),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paper::sample;
+
+    fn ratios(list: &[(&str, f64)]) -> Option<Summary> {
+        let scene_ratio = |&(scene, ratio): &(&str, f64)| SceneRatio { scene: scene.into(), ratio };
+        Summary::new(list.iter().map(scene_ratio).collect())
+    }
+
+    fn words(operations: f64, time: f64, size: f64) -> String {
+        let one = |ratio| ratios(&[("balls", ratio)]);
+        let verdict = Verdict {
+            method: "m",
+            title: "t",
+            role: "ingredient",
+            against: Method::EXACT,
+            operations: one(operations),
+            all_steps: None,
+            time: one(time),
+            size: one(size),
+            sentence: String::new(),
+        };
+        sentence(&verdict)
+    }
+
+    #[test]
+    fn two_per_cent_is_nothing() {
+        for ratio in [0.98, 1.0, 1.02, 0.981, 1.019] {
+            assert_eq!(Effect::of(ratio), Effect::Nothing, "{ratio}");
+        }
+        assert_eq!(Effect::of(0.979), Effect::Saves);
+        assert_eq!(Effect::of(1.021), Effect::Costs);
+    }
+
+    #[test]
+    fn wording() {
+        assert_eq!(words(1.0, 0.99, 1.01), "Brings nothing: operations, time and size within 2 %.");
+        assert_eq!(
+            words(0.877, 0.96, 1.0),
+            "Saves 12.3 % of the operations and 4.0 % of the time; size unchanged."
+        );
+        assert_eq!(
+            words(0.9, 1.0, 1.5),
+            "Saves 10.0 % of the operations, but costs a tree 50.0 % larger; time unchanged."
+        );
+        assert_eq!(
+            words(1.1, 1.2, 1.3),
+            "Saves nothing and costs 10.0 % more operations, 20.0 % more time and a tree 30.0 % larger."
+        );
+    }
+
+    #[test]
+    fn losses_on_single_scenes_are_named_worst_first() {
+        let summary = ratios(&[("balls", 0.7), ("tree", 1.03), ("tetra", 1.1), ("rings", 1.01)]);
+        assert_eq!(
+            losses("operations", &summary.unwrap()),
+            " Loses in operations on tetra (+10.0 %) and tree (+3.0 %)."
+        );
+        let all = ratios(&[("balls", 1.3), ("tree", 1.03)]).unwrap();
+        assert_eq!(losses("time", &all), " Loses in time on every scene.");
+        let none = ratios(&[("balls", 1.02), ("tree", 0.5)]).unwrap();
+        assert_eq!(losses("time", &none), "");
+    }
+
+    #[test]
+    fn each_method_has_its_opponent() {
+        let scenes = sample::scenes(2);
+        let verdicts = judge(&scenes);
+        let against = |name: &str| verdicts.iter().find(|v| v.method == name).map(|v| v.against);
+        assert_eq!(against("termination"), Some(Method::EXACT));
+        assert_eq!(against(Method::EXACT), Some(Method::REFERENCE));
+        assert_eq!(against("combined"), Some(Method::REFERENCE));
+        assert_eq!(against("combined-ropes"), Some("combined"));
+        assert_eq!(against(Method::REFERENCE), None);
+        assert_eq!(against("naive"), None);
+        assert!(verdicts.iter().all(|v| v.all_steps.is_some() == v.method.contains("rope")));
+    }
+
+    #[test]
+    fn the_headline_names_its_place_in_the_paper_s_range() {
+        let figures = |ratio| {
+            let one = || ratios(&[("balls", ratio), ("tree", ratio)]).unwrap();
+            HeadlineFigures { operations: one(), time: one(), size: one() }
+        };
+        assert!(headline_sentence(&figures(0.7)).contains("30.0 % fewer operations"));
+        assert!(headline_sentence(&figures(0.7)).contains("inside the 20 to 38 %"));
+        assert!(headline_sentence(&figures(0.9)).contains("less than the 20 to 38 %"));
+        assert!(headline_sentence(&figures(0.5)).contains("more than the 20 to 38 %"));
+        assert!(headline_sentence(&figures(1.2)).contains("20.0 % larger"));
+    }
+}
