@@ -13,7 +13,7 @@ use crate::cost::LeafCost;
 pub enum Role {
     /// What came before the paper.
     Baseline,
-    /// The paper's reference: [2] + [3].
+    /// The paper's reference: its citations 2 (MacDonald and Booth) and 3 (Sung and Shirley).
     Reference,
     /// The reference's measure minimised exactly; every ingredient is added to it alone.
     Exact,

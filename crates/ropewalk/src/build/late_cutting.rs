@@ -26,7 +26,7 @@ pub(crate) fn slabs(
     pricing: &Pricing,
 ) -> Vec<Slab> {
     let mut cuts = Vec::new();
-    let leaf_cost = pricing.leaf_cost.cost(fragments.len());
+    let leaf_cost = pricing.leaf_cost.leaf(fragments.len());
     if leaf_cost <= pricing.traversal_cost {
         return cuts;
     }

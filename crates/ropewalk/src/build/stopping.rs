@@ -59,7 +59,7 @@ impl Stopping {
             }
             // A traversal step alone costs as much as the leaf: no split can pay, here or below.
             Termination::Automatic { .. } | Termination::Cost { .. } => {
-                (pricing.leaf_cost.cost(count) <= pricing.traversal_cost)
+                (pricing.leaf_cost.leaf(count) <= pricing.traversal_cost)
                     .then_some(StopReason::Cost)
             }
         }
@@ -73,7 +73,7 @@ impl Stopping {
         failures: &mut u32,
         pricing: &Pricing,
     ) -> Option<StopReason> {
-        let leaf_cost = pricing.leaf_cost.cost(count);
+        let leaf_cost = pricing.leaf_cost.leaf(count);
         match self.termination {
             Termination::Fixed { .. } => None,
             Termination::Automatic { max_ratio } => {

@@ -74,7 +74,17 @@ pub enum LeafCost {
 }
 
 impl LeafCost {
-    /// The cost of `count` primitives in intersection tests.
+    /// The cost of a leaf that holds `count` primitives, in intersection tests: refinement is over,
+    /// so all of them are tested.
+    #[inline]
+    pub fn leaf(self, count: usize) -> f64 {
+        match self {
+            LeafCost::Logarithmic { .. } => count as f64,
+            LeafCost::Linear | LeafCost::Blocks { .. } => self.cost(count),
+        }
+    }
+
+    /// The cost of `count` primitives that may be refined further, in intersection tests.
     #[inline]
     pub fn cost(self, count: usize) -> f64 {
         match self {
