@@ -11,6 +11,9 @@ use crate::tree::{BspTree, NodeKind};
 
 /// Walks along single links: across each face to the neighbour, or to a tree node above all
 /// neighbours and down from there. See [`rope_trees`] for the rest, which is the same.
+///
+/// # Panics
+/// As [`rope_trees`].
 pub fn ropes<Q: Query, C: Counters>(
     geometry: &Geometry,
     tree: &BspTree,
@@ -30,7 +33,9 @@ pub fn ropes<Q: Query, C: Counters>(
 /// leave from there. It is `None` if the walk was finished from the root, left the scene or never
 /// reached it.
 ///
-/// The links belong to `tree`; with those of another tree the answer is that of some other scene.
+/// # Panics
+/// If the links are those of another tree, or the tree that of another geometry: use
+/// [`Accelerator`](crate::Accelerator), which joins only what belongs together.
 pub fn rope_trees<Q: Query, C: Counters>(
     geometry: &Geometry,
     tree: &BspTree,

@@ -19,6 +19,9 @@ use crate::tree::{BspTree, NodeKind};
 /// the sign of the direction names the near child, which is the origin's side for every plane
 /// ahead of the origin; all comparisons are closed with the slack of docs/numerics.md, and a
 /// parallel ray within the slack of the plane visits both children over its whole interval.
+///
+/// # Panics
+/// If the tree refers to primitives that `geometry` does not have.
 pub fn sung_shirley<Q: Query, C: Counters>(
     geometry: &Geometry,
     tree: &BspTree,

@@ -20,6 +20,9 @@ use crate::tree::{BspTree, NodeKind};
 /// condition of case Z1 testing the exit point where the entry point is meant); here it visits
 /// both, with the slack of docs/numerics.md, for a primitive may touch the plane from either side.
 /// Points are computed anew when a subtree is taken from the stack instead of being stored there.
+///
+/// # Panics
+/// If the tree refers to primitives that `geometry` does not have.
 pub fn ta_b<Q: Query, C: Counters>(
     geometry: &Geometry,
     tree: &BspTree,

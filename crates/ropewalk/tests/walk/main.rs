@@ -3,5 +3,6 @@
 mod bench;
 mod builders;
 mod exact;
+mod parts;
 mod ropes;
 mod scenes;
