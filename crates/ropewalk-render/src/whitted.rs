@@ -8,7 +8,7 @@ use crate::offset::lifted_origin;
 use crate::ray_counts::RayKind;
 use crate::shading::{ambient, direct, mirrored, refracted};
 use crate::vec3::{Vec3, add, add_scaled, dot, scale, sub, unit};
-use ropewalk::traverse::RayCaster;
+use ropewalk::traverse::{LeafId, RayCaster};
 use ropewalk::{Geometry, Hit, Ray};
 use ropewalk_scene::{Material, Scene};
 
@@ -58,35 +58,51 @@ struct SurfacePoint<'a> {
     shading: Vec3,
     /// True if the ray arrived at the front, from outside the object.
     outside: bool,
+    /// The leaf of the hit, if the caster knows it: where all rays that leave from here start.
+    leaf: Option<LeafId>,
 }
 
 impl<A: RayCaster> Whitted<'_, A> {
     /// The tree of rays of one eye ray.
     pub fn eye<O: Observer>(&self, ray: &Ray, observer: &mut O) -> EyeSample {
-        let Some(hit) = self.closest_hit(ray, RayKind::Primary, observer) else {
+        let (hit, leaf) = self.closest_hit(ray, RayKind::Primary, None, observer);
+        let Some(hit) = hit else {
             let color = self.scene.background;
             return EyeSample { color, distance: f32::INFINITY, normal: [0.0; 3] };
         };
-        let point = self.surface_point(ray, &hit);
+        let point = self.surface_point(ray, &hit, leaf);
         let color = self.shade(&point, 1, observer);
         EyeSample { color, distance: hit.t, normal: point.shading }
     }
 
     /// The colour that a secondary ray at level `depth` brings back; the background if it misses.
-    fn trace<O: Observer>(&self, ray: &Ray, kind: RayKind, depth: u32, observer: &mut O) -> Vec3 {
-        match self.closest_hit(ray, kind, observer) {
-            Some(hit) => self.shade(&self.surface_point(ray, &hit), depth, observer),
-            None => self.scene.background,
+    fn trace<O: Observer>(
+        &self,
+        ray: &Ray,
+        kind: RayKind,
+        from: &SurfacePoint,
+        depth: u32,
+        observer: &mut O,
+    ) -> Vec3 {
+        match self.closest_hit(ray, kind, from.leaf, observer) {
+            (Some(hit), leaf) => self.shade(&self.surface_point(ray, &hit, leaf), depth, observer),
+            (None, _) => self.scene.background,
         }
     }
 
-    fn closest_hit<O: Observer>(&self, ray: &Ray, kind: RayKind, observer: &mut O) -> Option<Hit> {
-        let hit = self.caster.closest_hit(ray, observer.cast(kind, ray));
+    fn closest_hit<O: Observer>(
+        &self,
+        ray: &Ray,
+        kind: RayKind,
+        start: Option<LeafId>,
+        observer: &mut O,
+    ) -> (Option<Hit>, Option<LeafId>) {
+        let (hit, leaf) = self.caster.closest_hit_from(ray, start, observer.cast(kind, ray));
         observer.answered(kind, hit.is_some());
-        hit
+        (hit, leaf)
     }
 
-    fn surface_point(&self, ray: &Ray, hit: &Hit) -> SurfacePoint<'_> {
+    fn surface_point(&self, ray: &Ray, hit: &Hit, leaf: Option<LeafId>) -> SurfacePoint<'_> {
         let material = self.scene.objects[hit.prim_id as usize].material;
         let normals = self.geometry.normals(ray, hit);
         let along = ray.dir.map(f64::from);
@@ -100,6 +116,7 @@ impl<A: RayCaster> Whitted<'_, A> {
             geometric: scale(normals.geometric, turn),
             shading: scale(normals.shading, turn),
             outside,
+            leaf,
         }
     }
 
@@ -116,14 +133,14 @@ impl<A: RayCaster> Whitted<'_, A> {
         }
         if reflects(material) {
             let ray = leaving_ray(point, reflection_dir(point));
-            let seen = self.trace(&ray, RayKind::Reflection, depth + 1, observer);
+            let seen = self.trace(&ray, RayKind::Reflection, point, depth + 1, observer);
             color = add_scaled(color, material.ks, seen);
         }
         if transmits(material)
             && let Some(dir) = refraction_dir(point)
         {
             let ray = leaving_ray(point, dir);
-            let seen = self.trace(&ray, RayKind::Refraction, depth + 1, observer);
+            let seen = self.trace(&ray, RayKind::Refraction, point, depth + 1, observer);
             color = add_scaled(color, material.transmittance, seen);
         }
         color
@@ -144,7 +161,8 @@ impl<A: RayCaster> Whitted<'_, A> {
             return [0.0; 3];
         }
         let ray = shadow_ray(point, light);
-        let blocked = self.caster.occluded(&ray, observer.cast(RayKind::Shadow, &ray));
+        let blocked =
+            self.caster.occluded_from(&ray, point.leaf, observer.cast(RayKind::Shadow, &ray));
         observer.answered(RayKind::Shadow, blocked);
         if blocked {
             return [0.0; 3];

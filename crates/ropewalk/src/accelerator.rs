@@ -232,4 +232,22 @@ impl RayCaster for Accelerator {
     fn occluded<C: Counters>(&self, ray: &Ray, counters: &mut C) -> bool {
         self.answer::<Occluded, C>(ray, None, counters).0
     }
+
+    fn closest_hit_from<C: Counters>(
+        &self,
+        ray: &Ray,
+        start: Option<LeafId>,
+        counters: &mut C,
+    ) -> (Option<Hit>, Option<LeafId>) {
+        Accelerator::closest_hit_from(self, ray, start, counters)
+    }
+
+    fn occluded_from<C: Counters>(
+        &self,
+        ray: &Ray,
+        start: Option<LeafId>,
+        counters: &mut C,
+    ) -> bool {
+        Accelerator::occluded_from(self, ray, start, counters)
+    }
 }
