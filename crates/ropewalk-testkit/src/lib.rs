@@ -1,5 +1,6 @@
 //! Generators and checks shared by the tests of ropewalk.
 
 pub mod data;
+pub mod primitives;
 pub mod rays;
 pub mod trees;

@@ -77,8 +77,8 @@ struct Frame {
     growth: f64,
 }
 
-/// A piece of the surface: a range of shares of the axis, and the angles within `half_angle` of
-/// the direction `toward` (unit, perpendicular to the axis), or from `angles.0` to `angles.1`.
+/// A piece of the surface: a range of shares of the axis, and a range of angles, counted from
+/// `toward` (unit, perpendicular to the axis) to `aside` (perpendicular to both).
 struct Piece {
     shares: (f64, f64),
     toward: DVec3,
@@ -158,13 +158,14 @@ impl Frame {
         if x.0 > r_max || y.0 > r_max || y.1 < -r_max || farthest < r_min {
             return None;
         }
-        let half = ((x.0 / r_max).max(-1.0) - SLACK).clamp(-1.0, 1.0).acos();
+        // cos(angle) = x / r and sin(angle) = y / r, each with the r that widens the range.
+        let ratio = |x: f64, r: f64| if r > 0.0 { (x / r).clamp(-1.0, 1.0) } else { x.signum() };
+        let cosine = ratio(x.0, if x.0 < 0.0 { r_min } else { r_max });
+        let half = (cosine - SLACK).max(-1.0).acos();
         let mut angles = (-half, half);
         if x.0 >= 0.0 {
-            // sin(angle) = y / r, with the r that widens the range.
-            let sine = |y: f64, r: f64| if r > 0.0 { (y / r).clamp(-1.0, 1.0) } else { y.signum() };
-            let low = sine(y.0, if y.0 < 0.0 { r_min } else { r_max });
-            let high = sine(y.1, if y.1 > 0.0 { r_min } else { r_max });
+            let low = ratio(y.0, if y.0 < 0.0 { r_min } else { r_max });
+            let high = ratio(y.1, if y.1 > 0.0 { r_min } else { r_max });
             angles.0 = angles.0.max((low - SLACK).max(-1.0).asin());
             angles.1 = angles.1.min((high + SLACK).min(1.0).asin());
             if angles.0 > angles.1 {
@@ -282,7 +283,7 @@ impl Primitive for Cone {
     fn intersect(&self, ray: &PreparedRay, sides: Sides) -> Option<Crossing> {
         let frame = self.frame();
         let square = frame.axis.length_squared();
-        if square == 0.0 {
+        if self.is_degenerate() {
             return None;
         }
         let (origin, dir) = (DVec3::from_array(ray.origin), DVec3::from_array(ray.dir));

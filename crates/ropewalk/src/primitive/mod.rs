@@ -130,9 +130,9 @@ pub struct SurfaceNormals {
 
 /// How far from the surface a ray may pass and still be reported, as a share of the largest
 /// coordinate of ray origin and primitive: the bounds of the kernels' errors, each stated at its
-/// primitive, lie below 2^-45, and vertices of a polygon that miss its plane by less than 2^-40
+/// primitive, lie below 2^-42, and vertices of a polygon that miss its plane by less than 2^-43
 /// are taken as in it.
-pub const HIT_ERROR: f64 = 1.0 / (1u64 << 40) as f64;
+pub const HIT_ERROR: f64 = 1.0 / (1u64 << 41) as f64;
 
 /// What a builder and a traversal need to know of a shape.
 ///

@@ -17,6 +17,11 @@ const THIN_SHARE: f64 = 1e-3;
 /// A piece thinner than this share of the cell is a step: its width would drift likewise.
 const STEP_SHARE: f64 = 1e-6;
 
+/// An edge shorter along the axis than this share of its loop has a constant width: the area
+/// inside it is off by at most `EDGE_SHARE / 4` of the loop's, and the slope stays below
+/// `2 / EDGE_SHARE` of area over thickness squared.
+const EDGE_SHARE: f64 = 1e-5;
+
 /// A projection that covers less than this share of its own box is a needle, and its widths would
 /// be differences of nearly equal numbers; it is treated as a thin piece. Its area is below the
 /// same share of the cell's.
@@ -123,45 +128,58 @@ fn half_spaces(cell: &Extent) -> impl Iterator<Item = HalfSpace> {
 
 /// A convex loop of few vertices on the stack.
 pub(super) struct SmallLoop {
-    points: [[f64; 3]; SmallLoop::CAPACITY],
+    /// Two buffers, used in turn.
+    points: [[[f64; 3]; SmallLoop::CAPACITY]; 2],
+    current: usize,
     len: usize,
 }
 
 impl SmallLoop {
-    /// A triangle cut by six planes has at most nine vertices; rounding can make an edge that
-    /// lies in a plane cross it more than once, so there is room for a few more.
-    const CAPACITY: usize = 14;
+    /// A power of two, so that indices can be masked.
+    const CAPACITY: usize = 16;
+
+    /// A triangle cut by six planes has at most nine vertices. Rounding can make an edge that lies
+    /// in a plane cross it more than once: a cut adds at most half as many vertices as there are.
+    const LONGEST: usize = 10;
 
     pub fn new<const N: usize>(corners: [[f64; 3]; N]) -> Self {
-        let mut points = [[0.0; 3]; Self::CAPACITY];
-        points[..N].copy_from_slice(&corners);
-        SmallLoop { points, len: N }
+        let mut points = [[[0.0; 3]; Self::CAPACITY]; 2];
+        points[0][..N].copy_from_slice(&corners);
+        SmallLoop { points, current: 0, len: N }
     }
 
     pub fn points(&self) -> &[[f64; 3]] {
-        &self.points[..self.len]
+        &self.points[self.current][..self.len]
     }
 
     /// Cuts the loop to one half-space (Sutherland, Hodgman 1974). `None` if it has run out of
     /// room, in which case the caller falls back on boxes.
     #[inline]
-    fn cut(&self, half: HalfSpace) -> Option<SmallLoop> {
-        let mut out = SmallLoop { points: [[0.0; 3]; Self::CAPACITY], len: 0 };
-        let Some(&last) = self.points().last() else { return Some(out) };
-        let (mut p, mut dp) = (last, half.depth(last));
-        for &q in self.points() {
+    fn cut(&mut self, half: HalfSpace) -> Option<()> {
+        const MASK: usize = SmallLoop::CAPACITY - 1;
+        if self.len == 0 || self.len > Self::LONGEST {
+            return (self.len == 0).then_some(());
+        }
+        let [first, second] = &mut self.points;
+        let (from, to) = if self.current == 0 { (first, second) } else { (second, first) };
+        let mut len = 0;
+        let mut p = from[(self.len - 1) & MASK];
+        let mut dp = half.depth(p);
+        for i in 0..self.len {
+            let q = from[i & MASK];
             let dq = half.depth(q);
             if (dp < 0.0 && dq > 0.0) || (dp > 0.0 && dq < 0.0) {
-                *out.points.get_mut(out.len)? = half.cut(p, q, dp, dq);
-                out.len += 1;
+                to[len & MASK] = half.cut(p, q, dp, dq);
+                len += 1;
             }
-            if dq >= 0.0 {
-                *out.points.get_mut(out.len)? = q;
-                out.len += 1;
-            }
+            // Written always, kept only inside: cheaper than a branch.
+            to[len & MASK] = q;
+            len += usize::from(dq >= 0.0);
             (p, dp) = (q, dq);
         }
-        Some(out)
+        self.current ^= 1;
+        self.len = len;
+        Some(())
     }
 
     /// Cuts the loop to `cell`, by those planes only that `bounds` (the loop's own box) crosses.
@@ -169,22 +187,20 @@ impl SmallLoop {
     pub fn clip(mut self, bounds: &Aabb, cell: &Extent) -> Option<SmallLoop> {
         for axis in 0..3 {
             if f64::from(bounds.min[axis]) < cell.min[axis] {
-                self = self.cut(HalfSpace { axis, bound: cell.min[axis], above: true })?;
+                self.cut(HalfSpace { axis, bound: cell.min[axis], above: true })?;
             }
             if f64::from(bounds.max[axis]) > cell.max[axis] {
-                self = self.cut(HalfSpace { axis, bound: cell.max[axis], above: false })?;
+                self.cut(HalfSpace { axis, bound: cell.max[axis], above: false })?;
             }
         }
         Some(self)
     }
 
     /// Cuts the loop to the slab of `cell` on one axis.
-    pub fn clip_axis(self, axis: usize, cell: &Extent) -> Option<SmallLoop> {
-        self.cut(HalfSpace { axis, bound: cell.min[axis], above: true })?.cut(HalfSpace {
-            axis,
-            bound: cell.max[axis],
-            above: false,
-        })
+    pub fn clip_axis(mut self, axis: usize, cell: &Extent) -> Option<SmallLoop> {
+        self.cut(HalfSpace { axis, bound: cell.min[axis], above: true })?;
+        self.cut(HalfSpace { axis, bound: cell.max[axis], above: false })?;
+        Some(self)
     }
 }
 
@@ -300,12 +316,12 @@ pub(super) fn loop_ramps(points: &[[f64; 3]], cell: &Aabb, axis: usize, out: &mu
     let at = |p: &[f64; 3]| (local(p), scale * (p[b] - b_lo));
     let edge = |(t0, b0): (f64, f64), (t1, b1): (f64, f64)| {
         let dt = t1 - t0;
-        match dt.abs() {
-            d if d <= STEP_SHARE * extent => Edge { step: 0.5 * (b0 + b1) * dt, ..Edge::default() },
-            d if d <= THIN_SHARE * extent => {
-                Edge { first: 0.5 * (b0 + b1), last: 0.5 * (b0 + b1), ..Edge::default() }
-            }
-            _ => Edge { first: b0, last: b1, slope: (b1 - b0) / dt, step: 0.0 },
+        if dt.abs() > EDGE_SHARE * thickness {
+            Edge { first: b0, last: b1, slope: (b1 - b0) / dt }
+        } else if dt != 0.0 {
+            Edge { first: 0.5 * (b0 + b1), last: 0.5 * (b0 + b1), slope: 0.0 }
+        } else {
+            Edge::default()
         }
     };
     let n = points.len();
@@ -316,11 +332,11 @@ pub(super) fn loop_ramps(points: &[[f64; 3]], cell: &Aabb, axis: usize, out: &mu
         let outgoing = edge(p, q);
         let ramp = AreaRamp {
             x: p.0,
-            step: outgoing.step,
+            step: 0.0,
             width: outgoing.first - incoming.last,
             slope: outgoing.slope - incoming.slope,
         };
-        if ramp.step != 0.0 || ramp.width != 0.0 || ramp.slope != 0.0 {
+        if ramp.width != 0.0 || ramp.slope != 0.0 {
             out.push(ramp);
         }
         (p, incoming) = (q, outgoing);
@@ -330,7 +346,6 @@ pub(super) fn loop_ramps(points: &[[f64; 3]], cell: &Aabb, axis: usize, out: &mu
 /// What an edge of a loop adds to the width at its first end and takes back at its last one.
 #[derive(Default)]
 struct Edge {
-    step: f64,
     first: f64,
     last: f64,
     slope: f64,

@@ -42,13 +42,14 @@ pub struct Polygon {
 }
 
 /// A point counts as on an edge within this share of the largest coordinate of ray origin and
-/// polygon: the plane's `t` and the point take fewer than 32 roundings of 2^-53. A grazing ray
-/// amplifies them beyond, and the rule for shared edges then does not hold.
-pub const EDGE_TOLERANCE: f64 = 1.0 / (1u64 << 48) as f64;
+/// polygon. The plane's `t` and the point take fewer than 16 roundings of 2^-53, which a ray that
+/// meets the plane at a cosine of 1/64 amplifies to 2^-43; the rule for shared edges does not hold
+/// for rays that graze more.
+pub const EDGE_TOLERANCE: f64 = 1.0 / (1u64 << 43) as f64;
 
 /// A vertex this close to the plane, as a share of the largest coordinate, lies in it: Newell's
-/// sums over 10^6 vertices may carry 2^-40, and an ulp of `f32` is 2^-23.
-const PLANE_TOLERANCE: f64 = 1.0 / (1u64 << 40) as f64;
+/// sums over 1000 vertices carry less, and half an ulp of `f32` is 2^-24.
+const PLANE_TOLERANCE: f64 = 1.0 / (1u64 << 43) as f64;
 
 impl Polygon {
     /// A polygon of at least three finite vertices. One without area is degenerate and never hit.
@@ -192,7 +193,7 @@ impl Polygon {
         };
         let rectangle = [[lo[0], lo[1]], [hi[0], lo[1]], [hi[0], hi[1]], [lo[0], hi[1]]];
         let piece = SmallLoop::new(rectangle.map(|[u, v]| corner(u, v))).clip_axis(kw, cell)?;
-        let tolerance = CLIP_SLACK * self.magnitude;
+        let tolerance = EDGE_TOLERANCE * self.magnitude;
         for &p in piece.points() {
             if self.covers(p[ku], p[kv], tolerance) {
                 extent.add(p);
