@@ -36,6 +36,11 @@ const CLIP_ROUNDS: usize = 3;
 /// Samples along the axis and around it by which the area inside a cell is summed up, and bins
 /// along the sweep: enough for 1 % of the cell's surface area.
 const SAMPLES: [usize; 2] = [12, 16];
+/// Samples of a surface that is [`SMALL`] against the cell.
+const FEW_SAMPLES: [usize; 2] = [4, 6];
+/// Share of the cell's area below which a surface's shape inside the cell hardly shows: a wrong
+/// ramp is off by less than half of the surface, so by less than 1 % of the cell.
+const SMALL: f64 = 0.02;
 const BINS: usize = 8;
 
 impl Cone {
@@ -259,11 +264,21 @@ impl Primitive for Cone {
         if self.is_degenerate() {
             return;
         }
+        let lower = f64::from(cell.min[axis]);
+        let small = self.area() <= SMALL * cell.area();
+        if small && cell.contains(&self.bounds()) {
+            let bounds = self.bounds();
+            let (lo, hi) = (f64::from(bounds.min[axis]), f64::from(bounds.max[axis]));
+            let width = self.area() / (hi - lo); // bounds are rounded outward: never flat
+            out.push(AreaRamp { x: lo - lower, width, ..Default::default() });
+            out.push(AreaRamp { x: hi - lower, width: -width, ..Default::default() });
+            return;
+        }
         let Some((part, piece)) = frame.narrow(&loose) else { return };
         let inside = Extent::widened(cell, [0.0; 3]);
         let (lo, hi) = (f64::from(part.min[axis]), f64::from(part.max[axis]));
-        let (bins, total) = frame.sampled_area(&piece, &inside, axis, lo, hi);
-        let lower = f64::from(cell.min[axis]);
+        let samples = if small { FEW_SAMPLES } else { SAMPLES };
+        let (bins, total) = frame.sampled_area(&piece, &inside, axis, (lo, hi), samples);
         if hi <= lo {
             out.push(AreaRamp { x: lo - lower, step: total, ..Default::default() });
             return;
@@ -351,22 +366,23 @@ impl Frame {
         piece: &Piece,
         cell: &Extent,
         axis: usize,
-        lo: f64,
-        hi: f64,
+        (lo, hi): (f64, f64),
+        samples: [usize; 2],
     ) -> ([f64; BINS], f64) {
         let (s, angle) = (piece.shares, piece.angles);
-        let step = ((s.1 - s.0) / SAMPLES[0] as f64, (angle.1 - angle.0) / SAMPLES[1] as f64);
+        let step = ((s.1 - s.0) / samples[0] as f64, (angle.1 - angle.0) / samples[1] as f64);
         let element = self.axis.length().hypot(self.growth) * step.0 * step.1;
-        let directions: [DVec3; SAMPLES[1]] = std::array::from_fn(|j| {
+        let mut directions = [DVec3::ZERO; SAMPLES[1]];
+        for (j, direction) in directions[..samples[1]].iter_mut().enumerate() {
             let (sin, cos) = (angle.0 + (j as f64 + 0.5) * step.1).sin_cos();
-            piece.toward * cos + piece.aside * sin
-        });
+            *direction = piece.toward * cos + piece.aside * sin;
+        }
         let scale = if hi > lo { BINS as f64 / (hi - lo) } else { 0.0 };
         let (mut bins, mut total) = ([0.0; BINS], 0.0);
-        for i in 0..SAMPLES[0] {
+        for i in 0..samples[0] {
             let share = s.0 + (i as f64 + 0.5) * step.0;
             let (center, r) = (self.center(share), self.radius_at(share));
-            for direction in &directions {
+            for direction in &directions[..samples[1]] {
                 let p = (center + r * *direction).to_array();
                 if cell.contains(p) {
                     let bin = ((p[axis] - lo) * scale) as usize;
