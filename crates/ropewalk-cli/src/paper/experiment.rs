@@ -3,7 +3,7 @@
 use super::candidate::Candidate;
 use super::model::*;
 use super::published;
-use super::replay::{self, Tally};
+use super::replay::{Answer, Replay, Tally};
 use super::scenes::{SceneChoice, Size};
 use super::statistics::{evenly, median, relative_spread};
 use crate::engine::{self, Loaded};
@@ -12,9 +12,9 @@ use crate::output::{PerRay, Rays, Tree};
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use ropewalk::method::Method;
-use ropewalk::traverse::Counts;
+use ropewalk::traverse::{Counts, LeafId};
 use ropewalk::{Geometry, Walk};
-use ropewalk_render::{RaySet, RecordedRay, RenderSettings, record_rays};
+use ropewalk_render::{RayKind, RaySet, RecordedRay, RenderSettings, record_rays};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -24,8 +24,14 @@ pub const ROUNDS: usize = 5;
 pub const SLOW_BUILD: f64 = 2.0;
 /// Most rays that are kept of a rendering (about 320 MB); beyond it every second, fourth, ... is.
 const MAX_RECORDED: usize = 8 << 20;
-/// Intersection tests that the naive search may spend in a round.
-const NAIVE_TESTS: usize = 20_000_000;
+/// Rays over which the cost of a method is looked at beforehand.
+const PROBE_RAYS: usize = 500;
+/// Operations that a method may spend in a timed round; methods of more than about a hundred a ray
+/// are timed on fewer rays.
+const TIMED_OPERATIONS: f64 = 1e7;
+/// Operations that a method may spend while events are counted; only methods of hundreds a ray are
+/// counted over fewer than all rays.
+const COUNTED_OPERATIONS: f64 = 1e9;
 
 /// What all scenes share.
 pub struct Setup<'a> {
@@ -56,7 +62,13 @@ pub fn steps() -> u64 {
 struct Entrant {
     method: Method,
     candidate: Candidate,
+    /// Operations a ray, as far as a first look tells.
+    probed: f64,
+    timed: Vec<RecordedRay>,
+    starts: Vec<Option<LeafId>>,
+    counted_rays: usize,
     counts: Counts,
+    counts_from_root: Option<Counts>,
     build_seconds: Vec<f64>,
     trace_seconds: Vec<f64>,
 }
@@ -65,17 +77,32 @@ impl Entrant {
     fn is_naive(&self) -> bool {
         self.method.walk == Walk::BruteForce
     }
-}
 
-/// Rays that are timed: the naive search affords fewer.
-struct Sample {
-    all: Vec<RecordedRay>,
-    naive: Vec<RecordedRay>,
-}
+    fn is_roped(&self) -> bool {
+        matches!(self.method.walk, Walk::Ropes | Walk::RopeTrees)
+    }
 
-impl Sample {
-    fn of(&self, entrant: &Entrant) -> &[RecordedRay] {
-        if entrant.is_naive() { &self.naive } else { &self.all }
+    /// `rays`, or as many of them at even distances as a budget of operations affords.
+    fn afford(&self, rays: &[RecordedRay], operations: f64) -> Vec<RecordedRay> {
+        evenly(rays, (operations / self.probed.max(1.0)).max(1.0) as usize)
+    }
+
+    /// The leaves from which links are followed: that of the surface which a ray leaves. A renderer
+    /// knows it from the hit before, so looking it up is neither timed nor counted.
+    fn start_leaves(&self, rays: &[RecordedRay]) -> Vec<Option<LeafId>> {
+        if !self.is_roped() {
+            return Vec::new();
+        }
+        let locate = |ray: &RecordedRay| match ray.kind {
+            RayKind::Primary => None,
+            _ => self.candidate.accelerator.locate(ray.ray.origin),
+        };
+        rays.iter().map(locate).collect()
+    }
+
+    /// The timed rays.
+    fn replay(&self) -> Replay<'_> {
+        Replay::from_leaves(&self.timed, &self.starts)
     }
 }
 
@@ -96,19 +123,13 @@ pub fn run(choice: &SceneChoice, setup: &Setup<'_>) -> anyhow::Result<(SceneResu
     let loaded = engine::load(&choice.spec())?;
     let mut entrants = build_all(&loaded.geometry, setup)?;
     let set = record(&loaded, &entrants, setup.timed_rays)?;
-    let sample = {
-        let all = evenly(&set.rays, setup.timed_rays);
-        let naive = replay::affordable(&all, loaded.geometry.len(), NAIVE_TESTS);
-        Sample { all, naive }
-    };
-    compare(&entrants, &sample).with_context(|| choice.spec())?;
+    choose_rays(&mut entrants, &set.rays, setup)?;
+    compare(&entrants).with_context(|| choice.spec())?;
     count_all(&mut entrants, &set.rays, setup).with_context(|| choice.spec())?;
     for _ in 0..ROUNDS {
-        round(&mut entrants, &loaded.geometry, &sample, setup)?;
+        round(&mut entrants, &loaded.geometry, setup)?;
     }
-    let counted = set.rays.len() as u64;
-    let mut methods: Vec<_> =
-        entrants.iter().map(|e| result(e, &loaded, counted, sample.of(e).len())).collect();
+    let mut methods: Vec<_> = entrants.iter().map(|e| result(e, &loaded)).collect();
     fill_ratios(&mut methods);
     let standard = setup.size == Size::Standard;
     let result = SceneResult {
@@ -116,9 +137,9 @@ pub fn run(choice: &SceneChoice, setup: &Setup<'_>) -> anyhow::Result<(SceneResu
         spec: choice.spec(),
         objects: loaded.geometry.len() as u64,
         rays: Rays::from(&set.counts),
-        counted_rays: counted,
+        counted_rays: set.rays.len() as u64,
         stride: set.stride,
-        timed_rays: sample.all.len() as u64,
+        timed_rays: set.rays.len().min(setup.timed_rays) as u64,
         published: published::efficiency(choice.name)
             .filter(|_| standard)
             .map(|e| Outside { octree: e.octree, grid: e.grid }),
@@ -134,8 +155,18 @@ fn build_all(geometry: &Arc<Geometry>, setup: &Setup<'_>) -> anyhow::Result<Vec<
         setup.step()?;
         let slow = candidate.seconds > SLOW_BUILD;
         let build_seconds = if slow { vec![candidate.seconds] } else { Vec::new() };
-        let trace_seconds = Vec::new();
-        Ok(Entrant { method, candidate, counts: Counts::default(), build_seconds, trace_seconds })
+        Ok(Entrant {
+            method,
+            candidate,
+            probed: 0.0,
+            timed: Vec::new(),
+            starts: Vec::new(),
+            counted_rays: 0,
+            counts: Counts::default(),
+            counts_from_root: None,
+            build_seconds,
+            trace_seconds: Vec::new(),
+        })
     };
     Method::all().into_iter().map(enter).collect()
 }
@@ -149,24 +180,54 @@ fn record(loaded: &Loaded, entrants: &[Entrant], timed: usize) -> anyhow::Result
     Ok(record_rays(scene, geometry, &best.candidate.accelerator, &RenderSettings::spd(), most)?)
 }
 
-/// Holds every method's answers against those of the first one that has a tree.
-fn compare(entrants: &[Entrant], sample: &Sample) -> anyhow::Result<()> {
-    let first = entrants.iter().find(|e| !e.is_naive()).context("no method has a tree")?;
-    let expect = |rays: &[RecordedRay]| replay::answers(&first.candidate.accelerator, rays);
-    let (expected, expected_naive) = (expect(&sample.all), expect(&sample.naive));
+/// Looks at each method's cost and gives it the rays that it is timed on: all the same, but for
+/// methods that are so slow that they are given every so many of them.
+fn choose_rays(
+    entrants: &mut [Entrant],
+    rays: &[RecordedRay],
+    setup: &Setup<'_>,
+) -> anyhow::Result<()> {
+    let timed = evenly(rays, setup.timed_rays);
+    let probe = evenly(rays, PROBE_RAYS);
     for entrant in entrants {
-        let rays = sample.of(entrant);
-        let expected = if entrant.is_naive() { &expected_naive } else { &expected };
-        let found = replay::answers(&entrant.candidate.accelerator, rays);
+        let caster = &entrant.candidate.accelerator;
+        let tally = Replay::from_root(&probe).tally(caster, setup.cancel);
+        let counts = tally.ok_or_else(interrupt::interrupted)?.counts;
+        let operations = counts.intersection_tests + counts.traversal_steps;
+        entrant.probed = operations as f64 / probe.len().max(1) as f64;
+        entrant.timed = entrant.afford(&timed, TIMED_OPERATIONS);
+        entrant.starts = entrant.start_leaves(&entrant.timed);
+    }
+    Ok(())
+}
+
+/// Holds every method's answers to the timed rays against those of the first that has a tree and
+/// is timed on all of them.
+fn compare(entrants: &[Entrant]) -> anyhow::Result<()> {
+    let most = entrants.iter().map(|e| e.timed.len()).max().unwrap_or(0);
+    let judge = entrants.iter().find(|e| !e.is_naive() && e.timed.len() == most);
+    let judge = judge.context("no method has a tree")?;
+    let answer =
+        |rays: &[RecordedRay]| Replay::from_root(rays).answers(&judge.candidate.accelerator);
+    let all: Vec<Answer> = answer(&judge.timed);
+    for entrant in entrants {
+        let own;
+        let expected = if entrant.timed.len() == most {
+            &all
+        } else {
+            own = answer(&entrant.timed);
+            &own
+        };
+        let found = entrant.replay().answers(&entrant.candidate.accelerator);
         let different = found.iter().zip(expected).position(|(f, e)| f != e);
         if let Some(i) = different {
             bail!(
                 "methods {} and {} disagree: {} against {} for {:?}",
                 entrant.method.name,
-                first.method.name,
+                judge.method.name,
                 found[i],
                 expected[i],
-                rays[i].ray
+                entrant.timed[i].ray
             );
         }
     }
@@ -180,16 +241,30 @@ fn count_all(
     setup: &Setup<'_>,
 ) -> anyhow::Result<()> {
     let mut first: Option<(&'static str, u64)> = None;
-    for entrant in entrants {
+    for entrant in entrants.iter_mut() {
+        let counted = entrant.afford(rays, COUNTED_OPERATIONS);
+        let caster = &entrant.candidate.accelerator;
+        let count = |replay: Replay<'_>| {
+            replay.tally(caster, setup.cancel).ok_or_else(interrupt::interrupted)
+        };
         if !entrant.is_naive() {
-            let tally = replay::tally(&entrant.candidate.accelerator, rays, setup.cancel);
-            let Tally { counts, digest } = tally.ok_or_else(interrupt::interrupted)?;
-            let (name, expected) = *first.get_or_insert((entrant.method.name, digest));
-            if digest != expected {
-                bail!("methods {} and {name} disagree on some of all rays", entrant.method.name);
+            let starts = entrant.start_leaves(&counted);
+            let Tally { counts, digest } = count(Replay::from_leaves(&counted, &starts))?;
+            if entrant.is_roped() {
+                entrant.counts_from_root = Some(count(Replay::from_root(&counted))?.counts);
+            }
+            if counted.len() == rays.len() {
+                let (name, expected) = *first.get_or_insert((entrant.method.name, digest));
+                if digest != expected {
+                    bail!(
+                        "methods {} and {name} disagree on some of all rays",
+                        entrant.method.name
+                    );
+                }
             }
             entrant.counts = counts;
         }
+        entrant.counted_rays = counted.len();
         setup.step()?;
     }
     Ok(())
@@ -199,7 +274,6 @@ fn count_all(
 fn round(
     entrants: &mut [Entrant],
     geometry: &Arc<Geometry>,
-    sample: &Sample,
     setup: &Setup<'_>,
 ) -> anyhow::Result<()> {
     for entrant in entrants {
@@ -207,14 +281,16 @@ fn round(
             let rebuilt = Candidate::build(geometry, &entrant.method, 1, setup.cancel)?;
             entrant.build_seconds.push(rebuilt.seconds);
         }
-        let rays = sample.of(entrant);
-        entrant.trace_seconds.push(replay::seconds(&entrant.candidate.accelerator, rays));
+        let seconds = entrant.replay().seconds(&entrant.candidate.accelerator);
+        entrant.trace_seconds.push(seconds);
         setup.step()?;
     }
     Ok(())
 }
 
-fn result(entrant: &Entrant, loaded: &Loaded, counted: u64, timed: usize) -> MethodResult {
+fn result(entrant: &Entrant, loaded: &Loaded) -> MethodResult {
+    let counted = entrant.counted_rays as u64;
+    let timed = entrant.timed.len();
     let Entrant { method, candidate, .. } = entrant;
     let build = median(&entrant.build_seconds);
     let trace = median(&entrant.trace_seconds);
@@ -233,13 +309,16 @@ fn result(entrant: &Entrant, loaded: &Loaded, counted: u64, timed: usize) -> Met
         name: method.name,
         title: method.title,
         role: role_name(method.role),
-        roped: matches!(method.walk, Walk::Ropes | Walk::RopeTrees),
+        roped: entrant.is_roped(),
         size: tree.size(),
         bytes_per_leaf: report.map(|r| bytes as f64 / r.tree.leaves.max(1) as f64),
         tree,
         operations,
-        all_steps: operations + per_ray.rope_crossings + per_ray.rope_tree_steps,
+        all_steps: all_steps(&per_ray),
         per_ray,
+        from_root: entrant.counts_from_root.as_ref().map(|c| PerRay::new(c, counted)),
+        counted_rays: counted,
+        timed_rays: timed as u64,
         seconds: MethodSeconds { read: loaded.seconds, build, trace },
         microseconds_per_ray: 1e6 * trace / timed.max(1) as f64,
         trace_spread: relative_spread(&entrant.trace_seconds),

@@ -117,8 +117,14 @@ pub struct MethodResult {
     pub size: u64,
     /// Bytes a leaf, ropes included; `None` without a tree.
     pub bytes_per_leaf: Option<f64>,
-    /// Counted events.
+    /// Counted events; rays that leave a surface start in its leaf where links are followed.
     pub per_ray: PerRay,
+    /// The same where every ray starts at the root; only where links are followed.
+    pub from_root: Option<PerRay>,
+    /// Rays over which events were counted; fewer than the scene's where a method is very slow.
+    pub counted_rays: u64,
+    /// Rays over which times were taken; fewer than the scene's where a method is slow.
+    pub timed_rays: u64,
     /// Intersection tests and traversal steps a ray, 1:1.
     pub operations: f64,
     /// Operations, rope crossings and steps in rope trees a ray.
@@ -250,6 +256,11 @@ pub struct ScalingPoint {
     pub operations: f64,
     /// Inner nodes and references.
     pub size: u64,
+}
+
+/// Operations, rope crossings and steps in rope trees.
+pub fn all_steps(per_ray: &PerRay) -> f64 {
+    per_ray.operations() + per_ray.rope_crossings + per_ray.rope_tree_steps
 }
 
 /// A role's name in reports.

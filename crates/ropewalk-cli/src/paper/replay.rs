@@ -1,8 +1,7 @@
 //! The same rays answered by any method: counted, timed, compared.
 
-use super::statistics::evenly;
 use rayon::prelude::*;
-use ropewalk::traverse::{Counters, Counts, NoCounts, RayCaster};
+use ropewalk::traverse::{Counters, Counts, LeafId, NoCounts, RayCaster};
 use ropewalk_render::{RayKind, RecordedRay};
 use std::hint::black_box;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,11 +20,16 @@ pub enum Answer {
 }
 
 impl Answer {
-    fn of<A: RayCaster, C: Counters>(caster: &A, ray: &RecordedRay, counters: &mut C) -> Self {
+    fn of<A: RayCaster, C: Counters>(
+        caster: &A,
+        ray: &RecordedRay,
+        start: Option<LeafId>,
+        counters: &mut C,
+    ) -> Self {
         if ray.kind == RayKind::Shadow {
-            Answer::Blocked(caster.occluded(&ray.ray, counters))
+            Answer::Blocked(caster.occluded_from(&ray.ray, start, counters))
         } else {
-            let hit = caster.closest_hit(&ray.ray, counters);
+            let (hit, _) = caster.closest_hit_from(&ray.ray, start, counters);
             Answer::FirstHit(hit.map(|hit| (hit.t, hit.prim_id)))
         }
     }
@@ -67,44 +71,65 @@ pub struct Tally {
     pub digest: u64,
 }
 
-/// Answers all rays on the threads of the current pool; the sums do not depend on their number.
-/// `None` once `cancel` is set.
-pub fn tally<A: RayCaster>(caster: &A, rays: &[RecordedRay], cancel: &AtomicBool) -> Option<Tally> {
-    let chunk_tally = |(index, chunk): (usize, &[RecordedRay])| {
-        if cancel.load(Ordering::Relaxed) {
-            return None;
-        }
-        let mut tally = Tally::default();
-        for (i, ray) in chunk.iter().enumerate() {
-            let answer = Answer::of(caster, ray, &mut tally.counts);
-            tally.digest = tally.digest.wrapping_add(answer.digest(index * CHUNK + i));
-        }
-        Some(tally)
-    };
-    rays.par_chunks(CHUNK).enumerate().map(chunk_tally).try_reduce(Tally::default, |a, b| {
-        let mut counts = a.counts;
-        counts += b.counts;
-        Some(Tally { counts, digest: a.digest.wrapping_add(b.digest) })
-    })
+/// Rays with the leaves in which they start, as far as these are known.
+#[derive(Clone, Copy)]
+pub struct Replay<'a> {
+    rays: &'a [RecordedRay],
+    starts: &'a [Option<LeafId>],
 }
 
-/// All answers, in the order of the rays.
-pub fn answers<A: RayCaster>(caster: &A, rays: &[RecordedRay]) -> Vec<Answer> {
-    rays.par_iter().map(|ray| Answer::of(caster, ray, &mut NoCounts)).collect()
-}
-
-/// Seconds that one thread takes to answer all rays.
-pub fn seconds<A: RayCaster>(caster: &A, rays: &[RecordedRay]) -> f64 {
-    let start = Instant::now();
-    for ray in rays {
-        black_box(Answer::of(caster, ray, &mut NoCounts));
+impl<'a> Replay<'a> {
+    /// All rays enter at the root.
+    pub fn from_root(rays: &'a [RecordedRay]) -> Self {
+        Replay { rays, starts: &[] }
     }
-    start.elapsed().as_secs_f64()
-}
 
-/// As many rays as the naive search can answer with about `tests` tests, and at most those.
-pub fn affordable(rays: &[RecordedRay], objects: usize, tests: usize) -> Vec<RecordedRay> {
-    evenly(rays, (tests / objects.max(1)).max(1))
+    /// Ray `i` starts in leaf `starts[i]`.
+    pub fn from_leaves(rays: &'a [RecordedRay], starts: &'a [Option<LeafId>]) -> Self {
+        Replay { rays, starts }
+    }
+
+    fn start(&self, ray: usize) -> Option<LeafId> {
+        self.starts.get(ray).copied().flatten()
+    }
+
+    /// Answers all rays on the threads of the current pool; the sums do not depend on their number.
+    /// `None` once `cancel` is set.
+    pub fn tally<A: RayCaster>(&self, caster: &A, cancel: &AtomicBool) -> Option<Tally> {
+        let chunk_tally = |(chunk, rays): (usize, &[RecordedRay])| {
+            if cancel.load(Ordering::Relaxed) {
+                return None;
+            }
+            let mut tally = Tally::default();
+            for (i, ray) in rays.iter().enumerate() {
+                let index = chunk * CHUNK + i;
+                let answer = Answer::of(caster, ray, self.start(index), &mut tally.counts);
+                tally.digest = tally.digest.wrapping_add(answer.digest(index));
+            }
+            Some(tally)
+        };
+        let tallies = self.rays.par_chunks(CHUNK).enumerate().map(chunk_tally);
+        tallies.try_reduce(Tally::default, |a, b| {
+            let mut counts = a.counts;
+            counts += b.counts;
+            Some(Tally { counts, digest: a.digest.wrapping_add(b.digest) })
+        })
+    }
+
+    /// All answers, in the order of the rays.
+    pub fn answers<A: RayCaster>(&self, caster: &A) -> Vec<Answer> {
+        let rays = self.rays.par_iter().enumerate();
+        rays.map(|(i, ray)| Answer::of(caster, ray, self.start(i), &mut NoCounts)).collect()
+    }
+
+    /// Seconds that one thread takes to answer all rays.
+    pub fn seconds<A: RayCaster>(&self, caster: &A) -> f64 {
+        let begin = Instant::now();
+        for (i, ray) in self.rays.iter().enumerate() {
+            black_box(Answer::of(caster, ray, self.start(i), &mut NoCounts));
+        }
+        begin.elapsed().as_secs_f64()
+    }
 }
 
 #[cfg(test)]
@@ -140,11 +165,12 @@ mod tests {
         let rays = rays(3 * CHUNK + 17);
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| tally(&HalfSpace, &rays, &AtomicBool::new(false))).unwrap()
+            pool.install(|| Replay::from_root(&rays).tally(&HalfSpace, &AtomicBool::new(false)))
+                .unwrap()
         };
         assert_eq!(run(1).counts.intersection_tests, rays.len() as u64);
         assert_eq!(run(1), run(3));
-        assert_eq!(tally(&HalfSpace, &rays, &AtomicBool::new(true)), None);
+        assert_eq!(Replay::from_root(&rays).tally(&HalfSpace, &AtomicBool::new(true)), None);
     }
 
     #[test]
@@ -165,12 +191,37 @@ mod tests {
         assert_eq!(digests.len(), 100 * all.len());
     }
 
+    /// Answers with the leaf in which the ray is said to start.
+    struct TellsStart;
+
+    impl RayCaster for TellsStart {
+        fn closest_hit<C: Counters>(&self, _: &Ray, _: &mut C) -> Option<Hit> {
+            None
+        }
+
+        fn occluded<C: Counters>(&self, _: &Ray, _: &mut C) -> bool {
+            false
+        }
+
+        fn closest_hit_from<C: Counters>(
+            &self,
+            _: &Ray,
+            start: Option<LeafId>,
+            _: &mut C,
+        ) -> (Option<Hit>, Option<LeafId>) {
+            (start.map(|leaf| Hit { t: 1.0, prim_id: leaf.0, u: 0.0, v: 0.0 }), None)
+        }
+    }
+
     #[test]
-    fn the_naive_search_gets_at_least_one_ray() {
-        assert_eq!(affordable(&rays(100), 10, 500).len(), 50);
-        assert_eq!(affordable(&rays(100), 10_000, 500).len(), 1);
-        assert_eq!(affordable(&rays(100), 1, 500).len(), 100);
-        assert!(seconds(&HalfSpace, &rays(10)) >= 0.0);
-        assert_eq!(answers(&HalfSpace, &rays(4))[1], Answer::FirstHit(Some((1.0, 7))));
+    fn every_ray_gets_its_own_start() {
+        let rays = rays(3);
+        let starts = [None, Some(LeafId(4)), Some(LeafId(5))];
+        let first = |prim| Answer::FirstHit(Some((1.0, prim)));
+        let none = Answer::FirstHit(None);
+        let replay = Replay::from_leaves(&rays, &starts);
+        assert_eq!(replay.answers(&TellsStart), [none, first(4), first(5)]);
+        assert_eq!(Replay::from_root(&rays).answers(&TellsStart), [none; 3]);
+        assert!(replay.seconds(&TellsStart) >= 0.0);
     }
 }

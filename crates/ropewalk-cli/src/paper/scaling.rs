@@ -2,7 +2,7 @@
 
 use super::candidate::Candidate;
 use super::model::ScalingPoint;
-use super::replay;
+use super::replay::Replay;
 use crate::{engine, interrupt};
 use anyhow::Context;
 use ropewalk::method::Method;
@@ -46,8 +46,10 @@ fn point(
     let settings = RenderSettings::spd();
     let caster = &candidate.accelerator;
     let set = record_rays(&loaded.scene, &loaded.geometry, caster, &settings, RAYS)?;
-    let counts =
-        replay::tally(caster, &set.rays, cancel).ok_or_else(interrupt::interrupted)?.counts;
+    let counts = Replay::from_root(&set.rays)
+        .tally(caster, cancel)
+        .ok_or_else(interrupt::interrupted)?
+        .counts;
     let objects = loaded.geometry.len();
     let n = objects as f64;
     let tree = caster.tree();

@@ -3,7 +3,7 @@
 use super::candidate::Candidate;
 use super::experiment::Recorded;
 use super::model::SensitivityCell;
-use super::replay;
+use super::replay::Replay;
 use super::statistics::evenly;
 use crate::interrupt;
 use anyhow::Context;
@@ -39,7 +39,7 @@ pub fn run(
         let build = method.build.take().context("the method has no tree")?;
         method.build = Some(BuildSettings { termination, ..build });
         let candidate = Candidate::build(&recorded.geometry, &method, threads, cancel)?;
-        let tally = replay::tally(&candidate.accelerator, &rays, cancel);
+        let tally = Replay::from_root(&rays).tally(&candidate.accelerator, cancel);
         let counts = tally.ok_or_else(interrupt::interrupted)?.counts;
         let events = counts.intersection_tests + counts.traversal_steps;
         Ok(events as f64 / rays.len().max(1) as f64)

@@ -68,12 +68,13 @@ impl Summary {
         Some(Summary { mean, geometric_mean, effect: Effect::of(mean), scenes })
     }
 
-    /// The scenes on which the ratio is worse than no change, worst first.
-    pub fn losses(&self) -> Vec<&SceneRatio> {
-        let mut losses: Vec<_> =
-            self.scenes.iter().filter(|s| Effect::of(s.ratio) == Effect::Costs).collect();
-        losses.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));
-        losses
+    /// The scenes with this effect, furthest from 1 first.
+    pub fn with_effect(&self, effect: Effect) -> Vec<&SceneRatio> {
+        let mut scenes: Vec<_> =
+            self.scenes.iter().filter(|s| Effect::of(s.ratio) == effect).collect();
+        let distance = |s: &SceneRatio| s.ratio.ln().abs();
+        scenes.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
+        scenes
     }
 }
 
@@ -168,21 +169,29 @@ pub fn summary(
     Summary::new(ratios.collect())
 }
 
-/// A ratio as a change in per cent, such as `-12.3 %`.
+/// A ratio from which on it is said as a multiple instead of a percentage.
+const MULTIPLE: f64 = 3.0;
+
+/// A ratio as a change in per cent, such as `-12.3 %`, or as a multiple where it is large.
 pub fn percent(ratio: f64) -> String {
     let change = 100.0 * (ratio - 1.0);
-    if change < 0.0 { format!("\u{2212}{:.1} %", -change) } else { format!("+{change:.1} %") }
+    if ratio >= MULTIPLE {
+        format!("\u{d7}{ratio:.1}")
+    } else if change < 0.0 {
+        format!("\u{2212}{:.1} %", -change)
+    } else {
+        format!("+{change:.1} %")
+    }
 }
 
-/// The verdict in words: what is saved, what is not, and where it loses.
+/// The verdict in words: what is saved, what is not, and where a scene goes the other way.
 fn sentence(verdict: &Verdict) -> String {
     let figures: Vec<_> = verdict.figures().collect();
-    let share = |s: &Summary| format!("{:.1} %", 100.0 * (s.mean - 1.0).abs());
     let listed = |effect| {
         let all = figures.iter().filter(move |(_, s)| s.effect == effect);
         all.map(|(name, s)| match effect {
-            Effect::Saves => format!("{} of {}", share(s), saved_words(name)),
-            Effect::Costs => paid_words(name, &share(s)),
+            Effect::Saves => saved_words(name, s.mean),
+            Effect::Costs => paid_words(name, s.mean),
             Effect::Nothing => (*name).to_owned(),
         })
         .collect::<Vec<_>>()
@@ -201,32 +210,46 @@ fn sentence(verdict: &Verdict) -> String {
     }
     text.push('.');
     for (name, summary) in &figures {
-        text += &losses(name, summary);
+        text += &exceptions(name, summary);
     }
     text
 }
 
-/// Where a figure that is saved or unchanged on the mean is lost all the same.
-fn losses(name: &str, summary: &Summary) -> String {
-    let losses = summary.losses();
-    if losses.is_empty() || summary.scenes.len() == 1 {
+/// The scenes that go against the mean: losses where it saves or does nothing, gains where it
+/// costs; the three furthest by name.
+fn exceptions(name: &str, summary: &Summary) -> String {
+    const NAMED: usize = 3;
+    let (word, against) = match summary.effect {
+        Effect::Costs => ("Gains", Effect::Saves),
+        Effect::Saves | Effect::Nothing => ("Loses", Effect::Costs),
+    };
+    let scenes = summary.with_effect(against);
+    if scenes.is_empty() {
         return String::new();
     }
-    if losses.len() == summary.scenes.len() {
-        return format!(" Loses in {name} on every scene.");
+    let mut list: Vec<_> =
+        scenes.iter().take(NAMED).map(|s| format!("{} ({})", s.scene, percent(s.ratio))).collect();
+    if scenes.len() > NAMED {
+        list.push(format!("{} more", scenes.len() - NAMED));
     }
-    let list: Vec<_> =
-        losses.iter().map(|s| format!("{} ({})", s.scene, percent(s.ratio))).collect();
-    format!(" Loses in {name} on {}.", join(&list))
+    format!(" {word} in {name} on {}.", join(&list))
 }
 
-fn saved_words(name: &str) -> String {
-    if name == "all steps" { name.to_owned() } else { format!("the {name}") }
+fn saved_words(name: &str, ratio: f64) -> String {
+    let share = format!("{:.1} %", 100.0 * (1.0 - ratio));
+    if name == "all steps" {
+        format!("{share} of all steps")
+    } else {
+        format!("{share} of the {name}")
+    }
 }
 
-fn paid_words(name: &str, share: &str) -> String {
+fn paid_words(name: &str, ratio: f64) -> String {
+    let share = format!("{:.1} %", 100.0 * (ratio - 1.0));
     match name {
+        "size" if ratio >= MULTIPLE => format!("a tree {ratio:.1} times as large"),
         "size" => format!("a tree {share} larger"),
+        _ if ratio >= MULTIPLE => format!("{ratio:.1} times the {name}"),
         "all steps" => format!("{share} more steps in all"),
         _ => format!("{share} more {name}"),
     }
@@ -367,16 +390,32 @@ mod tests {
     }
 
     #[test]
-    fn losses_on_single_scenes_are_named_worst_first() {
-        let summary = ratios(&[("balls", 0.7), ("tree", 1.03), ("tetra", 1.1), ("rings", 1.01)]);
+    fn scenes_against_the_mean_are_named_furthest_first() {
+        let mixed = ratios(&[("balls", 0.7), ("tree", 1.03), ("tetra", 1.1), ("rings", 1.01)]);
         assert_eq!(
-            losses("operations", &summary.unwrap()),
+            exceptions("operations", &mixed.unwrap()),
             " Loses in operations on tetra (+10.0 %) and tree (+3.0 %)."
         );
-        let all = ratios(&[("balls", 1.3), ("tree", 1.03)]).unwrap();
-        assert_eq!(losses("time", &all), " Loses in time on every scene.");
+        let many = [("a", 0.1), ("b", 1.1), ("c", 1.2), ("d", 1.3), ("e", 1.15)];
+        assert_eq!(
+            exceptions("time", &ratios(&many).unwrap()),
+            " Loses in time on d (+30.0 %), c (+20.0 %), e (+15.0 %) and 1 more."
+        );
+        let costs = ratios(&[("balls", 1.3), ("tree", 0.9)]).unwrap();
+        assert_eq!(exceptions("time", &costs), " Gains in time on tree (\u{2212}10.0 %).");
         let none = ratios(&[("balls", 1.02), ("tree", 0.5)]).unwrap();
-        assert_eq!(losses("time", &none), "");
+        assert_eq!(exceptions("time", &none), "");
+    }
+
+    #[test]
+    fn large_ratios_are_multiples() {
+        assert_eq!(percent(2.99), "+199.0 %");
+        assert_eq!(percent(23.18), "\u{d7}23.2");
+        assert_eq!(
+            words(23.18, 4.0, 5.0),
+            "Saves nothing and costs 23.2 times the operations, 4.0 times the time and a tree 5.0 \
+             times as large."
+        );
     }
 
     #[test]

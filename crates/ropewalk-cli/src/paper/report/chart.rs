@@ -6,10 +6,34 @@ use crate::paper::verdict::{Effect, SceneRatio, Summary, percent};
 
 /// Width of a chart in user units: that of a phone, so that its text is readable there.
 const WIDTH: f64 = 340.0;
-/// Ratios shown on strips; what lies outside sits on the edge.
-const RATIO_RANGE: [f64; 2] = [0.4, 2.5];
-/// Marked ratios on strips.
-const RATIO_TICKS: [f64; 5] = [0.5, 0.7, 1.0, 1.4, 2.0];
+/// An axis of strips: ratios from `1 / reach` to `reach`, with these marked.
+pub struct StripAxis {
+    reach: f64,
+    ticks: &'static [f64],
+}
+
+/// From the closest look to the widest.
+const STRIP_AXES: [StripAxis; 3] = [
+    StripAxis { reach: 1.3, ticks: &[0.8, 0.9, 1.0, 1.1, 1.25] },
+    StripAxis { reach: 1.75, ticks: &[0.6, 0.8, 1.0, 1.25, 1.6] },
+    StripAxis { reach: 2.6, ticks: &[0.4, 0.6, 1.0, 1.6, 2.5] },
+];
+
+/// Share of the ratios that must lie on a common axis; the others sit on its edge.
+const ON_AXIS: f64 = 0.8;
+
+impl StripAxis {
+    /// The closest look that holds most of the ratios.
+    pub fn for_ratios<'a>(summaries: impl Iterator<Item = &'a Summary>) -> &'static StripAxis {
+        let distances: Vec<_> =
+            summaries.flat_map(|s| &s.scenes).map(|s| s.ratio.ln().abs().exp()).collect();
+        let holds = |axis: &&StripAxis| {
+            let inside = distances.iter().filter(|d| **d <= axis.reach).count();
+            inside as f64 >= ON_AXIS * distances.len() as f64
+        };
+        STRIP_AXES.iter().find(holds).unwrap_or(&STRIP_AXES[STRIP_AXES.len() - 1])
+    }
+}
 
 fn effect_class(effect: Effect) -> &'static str {
     match effect {
@@ -20,14 +44,14 @@ fn effect_class(effect: Effect) -> &'static str {
 }
 
 /// One strip a figure: a dot a scene, the mean as a bar, a line where nothing changes.
-pub fn strips(figures: &[(&'static str, &Summary)], label: &str) -> String {
+pub fn strips(figures: &[(&'static str, &Summary)], axis: &StripAxis, label: &str) -> String {
     const ROW: f64 = 30.0;
     const LEFT: f64 = 78.0;
     const RIGHT: f64 = WIDTH - 66.0;
     let bottom = 6.0 + ROW * figures.len() as f64;
     let mut svg = Svg::new(WIDTH, bottom + 20.0, label);
-    let scale = LogScale::new(RATIO_RANGE[0], RATIO_RANGE[1], LEFT, RIGHT);
-    for tick in RATIO_TICKS {
+    let scale = LogScale::new(1.0 / axis.reach, axis.reach, LEFT, RIGHT);
+    for &tick in axis.ticks {
         let class = if tick == 1.0 { "one" } else { "grid" };
         svg.line(class, [scale.at(tick), 4.0], [scale.at(tick), bottom]);
         svg.text("tick", [scale.at(tick), bottom + 14.0], Anchor::Middle, &tick_label(tick));
@@ -49,8 +73,8 @@ pub fn strips(figures: &[(&'static str, &Summary)], label: &str) -> String {
     svg.finish()
 }
 
-/// Bars of ratios, one group a scene; `series` holds a name and its ratios. At most three series.
-pub fn scene_bars(series: &[(&str, &Summary)], label: &str) -> String {
+/// Bars of ratios, one group a scene; `series` holds a name and its ratios, three at most.
+pub fn scene_bars(series: &[(&str, &Summary)], figure: &str) -> String {
     const BAR: f64 = 11.0;
     const LEFT: f64 = 62.0;
     const RIGHT: f64 = WIDTH - 46.0;
@@ -61,7 +85,7 @@ pub fn scene_bars(series: &[(&str, &Summary)], label: &str) -> String {
     let largest =
         series.iter().flat_map(|(_, s)| &s.scenes).fold(1.0f64, |largest, s| largest.max(s.ratio));
     let at = |ratio: f64| LEFT + (RIGHT - LEFT) * ratio / largest;
-    let mut svg = Svg::new(WIDTH, bottom + 36.0, label);
+    let mut svg = Svg::new(WIDTH, bottom + 36.0, &format!("{figure} of each scene, reference = 1"));
     for (i, (name, summary)) in series.iter().enumerate() {
         let y = 5.0 + 17.0 * i as f64;
         svg.rect(&format!("series{i}"), [0.0, y], [12.0, 10.0], name);
@@ -76,7 +100,7 @@ pub fn scene_bars(series: &[(&str, &Summary)], label: &str) -> String {
         svg.text("tick", [at(ratio), bottom + 14.0], Anchor::Middle, &tick_label(ratio));
     }
     let middle = [(LEFT + RIGHT) / 2.0, bottom + 31.0];
-    svg.text("axis", middle, Anchor::Middle, "operations, reference = 1");
+    svg.text("axis", middle, Anchor::Middle, &format!("{figure}, reference = 1"));
     for (g, SceneRatio { scene, .. }) in first.scenes.iter().enumerate() {
         let top = legend + group * g as f64 + 5.0;
         let middle = top + BAR * series.len() as f64 / 2.0;
@@ -189,7 +213,7 @@ mod tests {
     #[test]
     fn strips_mark_each_scene_and_stay_inside() {
         let summary = summary(&[0.01, 0.9, 1.0, 50.0]);
-        let svg = strips(&[("operations", &summary)], "label");
+        let svg = strips(&[("operations", &summary)], &STRIP_AXES[0], "label");
         check_balance(&svg).unwrap();
         assert_eq!(svg.matches("class=\"scene\"").count(), 4);
         for part in svg.split("cx=\"").skip(1) {

@@ -3,7 +3,8 @@
 use crate::paper::model::Experiment;
 use crate::paper::report::chart;
 use crate::paper::report::html::{Cell, Table, escape, figure, paragraph};
-use crate::paper::verdict::{HeadlineFigures, percent};
+use crate::paper::verdict::{HeadlineFigures, Summary, Verdict, percent};
+use ropewalk::method::Method;
 
 /// Title, big numbers, one paragraph, the ratio on each scene.
 pub fn headline(experiment: &Experiment) -> String {
@@ -37,7 +38,7 @@ pub fn headline(experiment: &Experiment) -> String {
          as Sung and Shirley do. Both sides end at leaves of two or at depth 1.2 log2 N + 2.",
     );
     html += "<div class=\"charts\">\n";
-    html += &chart_of_scenes(experiment);
+    html += &charts_of_scenes(experiment);
     html += "</div>\n";
     html += &means(
         headline.combined.as_ref(),
@@ -47,14 +48,25 @@ pub fn headline(experiment: &Experiment) -> String {
     html
 }
 
-fn chart_of_scenes(experiment: &Experiment) -> String {
+/// Operations, time and size, each over the reference's.
+fn charts_of_scenes(experiment: &Experiment) -> String {
+    type Figure = fn(&Verdict) -> &Option<Summary>;
+    let figures: [(&str, Figure); 3] = [
+        ("operations", |v| &v.operations),
+        ("time of a ray", |v| &v.time),
+        ("size of the tree", |v| &v.size),
+    ];
     let find = |name: &str| experiment.verdicts.iter().find(|v| v.method == name);
-    let series: Vec<_> = ["macdonald-booth", "combined", "best"]
-        .into_iter()
-        .filter_map(|name| Some((name, find(name)?.operations.as_ref()?)))
-        .collect();
-    let svg = chart::scene_bars(&series, "Operations of each scene over those of the reference");
-    figure(&svg, "Operations a ray over those of the reference, scene by scene; below 1 is better.")
+    let chart = |(name, pick): (&str, Figure)| {
+        let series: Vec<_> = [Method::EXACT, "combined", Method::DEFAULT]
+            .into_iter()
+            .filter_map(|method| Some((method, pick(find(method)?).as_ref()?)))
+            .collect();
+        let caption =
+            format!("The {name} over the reference's, scene by scene; below 1 is better.");
+        figure(&chart::scene_bars(&series, name), &caption)
+    };
+    figures.map(chart).concat()
 }
 
 fn means(

@@ -1,7 +1,7 @@
 //! A card a method: the verdict and its strips.
 
 use crate::paper::model::Experiment;
-use crate::paper::report::chart;
+use crate::paper::report::chart::{self, StripAxis};
 use crate::paper::report::html::{escape, note, paragraph};
 use crate::paper::verdict::Verdict;
 
@@ -18,21 +18,28 @@ pub fn ingredients(experiment: &Experiment) -> String {
         ("What came before", &["baseline"]),
     ];
     for (title, roles) in groups {
-        let cards: String = experiment
+        let verdicts: Vec<_> = experiment
             .verdicts
             .iter()
             .filter(|v| roles.contains(&v.role) && v.all_steps.is_none())
-            .map(card)
             .collect();
-        if !cards.is_empty() {
-            html += &format!("<h3>{title}</h3>\n<div class=\"cards\">\n{cards}</div>\n");
+        let cards = cards(&verdicts);
+        if !verdicts.is_empty() {
+            html += &format!("<h3>{title}</h3>\n{cards}");
         }
     }
     html + &note("Ropes and rope trees follow in a section of their own.")
 }
 
-/// One method's card.
-pub fn card(verdict: &Verdict) -> String {
+/// Cards side by side, all on one axis.
+pub fn cards(verdicts: &[&Verdict]) -> String {
+    let summaries = verdicts.iter().flat_map(|v| v.figures()).map(|(_, summary)| summary);
+    let axis = StripAxis::for_ratios(summaries);
+    let cards: String = verdicts.iter().map(|v| card(v, axis)).collect();
+    format!("<div class=\"cards\">\n{cards}</div>\n")
+}
+
+fn card(verdict: &Verdict, axis: &StripAxis) -> String {
     let figures: Vec<_> = verdict.figures().collect();
     let label = format!("{} over {}, a dot a scene", verdict.method, verdict.against);
     format!(
@@ -42,6 +49,6 @@ pub fn card(verdict: &Verdict) -> String {
         verdict.method,
         verdict.against,
         escape(&verdict.sentence),
-        chart::strips(&figures, &label)
+        chart::strips(&figures, axis, &label)
     )
 }

@@ -28,8 +28,9 @@ pub fn protocol(experiment: &Experiment) -> String {
         100.0 * median(&spreads)
     ));
     html += &paragraph(&format!(
-        "{slow} trees took more than {} seconds and were built once. The naive search answers an even \
-         subsample; it tests every object for every ray by definition.",
+        "{slow} trees took more than {} seconds and were built once. Methods of more than about a \
+         hundred operations a ray are timed, and of more than several hundreds counted, on an even \
+         subsample of the rays; the naive search tests every object for every ray by definition.",
         p.slow_build_seconds
     ));
     html += &format!(

@@ -1,7 +1,7 @@
 //! Ropes and rope trees trade one kind of step for another, so they have columns of their own.
 
-use super::ingredients::card;
-use crate::paper::model::{Experiment, MethodResult};
+use super::ingredients::cards;
+use crate::paper::model::{Experiment, MethodResult, all_steps};
 use crate::paper::report::html::{Cell, Table, paragraph};
 use crate::paper::statistics::mean;
 
@@ -13,11 +13,11 @@ pub fn ropes(experiment: &Experiment) -> String {
     }
     let mut html = paragraph(
         "A link replaces a descent from the root. Operations count tests and inner nodes of the BSP \
-         as everywhere else; all steps add the faces crossed and the inner nodes of rope trees. Rays \
-         start at the root, as in the reference, and follow links from their first leaf on.",
+         as everywhere else; all steps add the faces crossed and the inner nodes of rope trees. Eye \
+         rays start at the root; rays that leave a surface start in its leaf, which the renderer \
+         knows from the hit before. The column from root counts all steps where it does not.",
     );
-    let cards: String = roped.iter().map(|v| card(v)).collect();
-    html += &format!("<div class=\"cards\">\n{cards}</div>\n");
+    html += &cards(&roped);
     html + &table(experiment)
 }
 
@@ -31,6 +31,7 @@ fn table(experiment: &Experiment) -> String {
             "crossings",
             "rope-tree steps",
             "all steps",
+            "from root",
             "restarts",
             "\u{b5}s",
             "bytes a leaf",
@@ -60,6 +61,7 @@ fn table(experiment: &Experiment) -> String {
             Cell::value(over(|m| m.per_ray.rope_crossings), 2),
             Cell::value(over(|m| m.per_ray.rope_tree_steps), 2),
             Cell::value(over(|m| m.all_steps), 2).strong(),
+            Cell::value(over(|m| m.from_root.map_or(m.all_steps, |p| all_steps(&p))), 2),
             Cell::value(over(|m| m.per_ray.restarts), 4),
             Cell::value(over(|m| m.microseconds_per_ray), 3),
             Cell::value(over(|m| m.bytes_per_leaf.unwrap_or(0.0)), 1),
