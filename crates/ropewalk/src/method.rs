@@ -72,8 +72,11 @@ impl Method {
             clipping: true,
             ..shared.clone()
         };
+        // The lowest counted cost over the eight SPD scenes among the settings tried.
         let best = BuildSettings {
+            estimator: TerminationEstimator::Projection,
             termination: Termination::Cost { max_depth: None },
+            traversal_cost: 1.5,
             ..combined.clone()
         };
         use Role::*;
@@ -222,7 +225,9 @@ impl Method {
             Some(combined),
             RopeTrees,
         );
-        add(Combined, Self::DEFAULT, "the combination, ended by cost", Some(best), TaB);
+        let title = "f* by projection, perfect splits, both cuttings, ended by cost";
+        add(Combined, Self::DEFAULT, title, Some(best.clone()), TaB);
+        add(Combined, "best-rope-trees", "the same tree, rope trees", Some(best), RopeTrees);
         methods
     }
 
