@@ -46,8 +46,8 @@ fn effect_class(effect: Effect) -> &'static str {
 /// One strip a figure: a dot a scene, the mean as a bar, a line where nothing changes.
 pub fn strips(figures: &[(&'static str, &Summary)], axis: &StripAxis, label: &str) -> String {
     const ROW: f64 = 30.0;
-    const LEFT: f64 = 78.0;
-    const RIGHT: f64 = WIDTH - 66.0;
+    const LEFT: f64 = 82.0;
+    const RIGHT: f64 = WIDTH - 68.0;
     let bottom = 6.0 + ROW * figures.len() as f64;
     let mut svg = Svg::new(WIDTH, bottom + 20.0, label);
     let scale = LogScale::new(1.0 / axis.reach, axis.reach, LEFT, RIGHT);
@@ -58,7 +58,7 @@ pub fn strips(figures: &[(&'static str, &Summary)], axis: &StripAxis, label: &st
     }
     for (i, (name, summary)) in figures.iter().enumerate() {
         let y = 6.0 + ROW * (i as f64 + 0.5);
-        svg.text("row", [LEFT - 10.0, y + 4.0], Anchor::End, name);
+        svg.text("row", [LEFT - 14.0, y + 4.0], Anchor::End, name);
         for SceneRatio { scene, ratio } in &summary.scenes {
             let tip = format!("{scene}: {ratio:.3}");
             svg.dot("scene", [scale.at(*ratio), y], 4.5, &tip);
