@@ -1,0 +1,388 @@
+//! The benchmark against the peers: verifies, times, records. See docs/performance.md.
+
+use anyhow::Context;
+use clap::Parser;
+use ropewalk_bench::answer::BenchHit;
+use ropewalk_bench::harness::{
+    Answers, Budget, Builder, Engine, Family, MAX_WRONG_PER_MILLION, Oracle, Record, Row,
+    Testimony, build_rates, calibrate, chart, cpu_name, rates, summary, verify,
+};
+use ropewalk_bench::peer::{
+    BvhBuilder, BvhPeer, Call, Embree, EmbreeBuilder, EmbreeEngine, EmbreeScene, ObvhsBuilder,
+    ObvhsPeer, ParryBuilder, ParryPeer, Quality,
+};
+use ropewalk_bench::scene::{Catalog, Mesh, Scene};
+use ropewalk_bench::workload::{Generator, Kind, Sizes, Workload};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+
+/// Measures rays per second of ropewalk and its peers on the same rays in one process.
+#[derive(Parser)]
+struct Arguments {
+    /// Scenes, separated by commas; all without this.
+    #[arg(long, value_delimiter = ',')]
+    scenes: Vec<String>,
+    /// Workloads, separated by commas; all without this.
+    #[arg(long, value_delimiter = ',')]
+    workloads: Vec<String>,
+    /// Only engines whose name contains one of these; Embree's plain entry points always run.
+    #[arg(long, value_delimiter = ',')]
+    engines: Vec<String>,
+    /// Rounds of each engine.
+    #[arg(long)]
+    rounds: Option<usize>,
+    /// Fewer rays and rounds, for trying out; the record goes to target/bench-quick.
+    #[arg(long)]
+    quick: bool,
+    /// Numbers of threads, or `all`.
+    #[arg(long, value_delimiter = ',', default_value = "1,all")]
+    threads: Vec<String>,
+    /// Embree's shared library; without this it is looked for in .venv-bench.
+    #[arg(long)]
+    embree: Option<PathBuf>,
+    /// The folder of shared scenes.
+    #[arg(long, default_value = "../shared/data")]
+    data: PathBuf,
+    /// The folder of generated scenes.
+    #[arg(long, default_value = "target/bench-scenes")]
+    generated: PathBuf,
+    /// Where the record goes.
+    #[arg(long)]
+    out: Option<PathBuf>,
+}
+
+/// What a run does, checked.
+struct Plan {
+    kinds: Vec<Kind>,
+    engines: Vec<String>,
+    threads: Vec<usize>,
+    budget: Budget,
+    sizes: Sizes,
+    /// The device for tracing first, then one for each other number of threads for builds.
+    devices: Vec<Arc<Embree>>,
+}
+
+impl Plan {
+    fn wants(&self, engine: &str, family: Family) -> bool {
+        let listed = || self.engines.iter().any(|e| engine.contains(e.as_str()));
+        family == Family::Embree || self.engines.is_empty() || listed()
+    }
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("bench: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// True if every scene was there and every answer right.
+fn run(arguments: &Arguments) -> anyhow::Result<bool> {
+    let entries = Catalog::select(&arguments.scenes)?;
+    let catalog = Catalog { data: arguments.data.clone(), generated: arguments.generated.clone() };
+    let plan = plan(arguments)?;
+    let mut record = Record {
+        cpu: cpu_name(),
+        commit: commit(),
+        settings: format!(
+            "Embree {} high; rounds {}; clock {}; side {}; {}",
+            plan.devices[0].version(),
+            plan.budget.rounds,
+            "thread CPU (1 thread), wall (more)",
+            plan.sizes.side,
+            if cfg!(target_feature = "avx2") { "compiled for this CPU" } else { "baseline x86-64" }
+        ),
+        rows: Vec::new(),
+    };
+    eprintln!("{}, commit {}; {}", record.cpu, record.commit, record.settings);
+    let out = arguments.out.clone().unwrap_or_else(|| {
+        PathBuf::from(if arguments.quick { "target/bench-quick" } else { "bench/record" })
+    });
+    let dated = out.join(format!("{}-{}.csv", today(), record.commit.replace('+', "-dirty")));
+    for entry in &entries {
+        match catalog.load(entry) {
+            Ok(scene) => run_scene(&plan, &scene, &mut record)?,
+            Err(error) => {
+                eprintln!("{}: {error:#}", entry.name);
+                record.rows.push(Row::error(entry.name, "*", format!("{error:#}")));
+            }
+        }
+        Record::write(&dated, &record.csv())?;
+    }
+    Record::write(&out.join("latest.csv"), &record.csv())?;
+    Record::write(&out.join("latest.svg"), &chart(&record))?;
+    println!("{}", summary(&record));
+    println!("record: {}   chart: {}", dated.display(), out.join("latest.svg").display());
+    Ok(record.rows.iter().all(|r| r.error.is_empty()))
+}
+
+fn plan(arguments: &Arguments) -> anyhow::Result<Plan> {
+    let kinds = if arguments.workloads.is_empty() {
+        Kind::ALL.to_vec()
+    } else {
+        let known = || Kind::ALL.map(Kind::name).join(", ");
+        let parse = |n: &String| {
+            Kind::named(n)
+                .with_context(|| format!("unknown workload {n}; the workloads are {}", known()))
+        };
+        arguments.workloads.iter().map(parse).collect::<Result<_, _>>()?
+    };
+    let available = std::thread::available_parallelism()?.get();
+    let parse = |n: &String| match n.as_str() {
+        "all" => Ok(available),
+        n => n.parse().with_context(|| format!("threads: expected a number or all, found {n}")),
+    };
+    let mut threads = arguments.threads.iter().map(parse).collect::<Result<Vec<_>, _>>()?;
+    threads.sort_unstable();
+    threads.dedup();
+    anyhow::ensure!(threads.first().is_some_and(|&t| t > 0), "at least one thread is needed");
+    let (mut budget, sizes) =
+        if arguments.quick { (Budget::QUICK, Sizes::QUICK) } else { (Budget::FULL, Sizes::FULL) };
+    budget.rounds = arguments.rounds.unwrap_or(budget.rounds);
+    anyhow::ensure!(budget.rounds > 0, "at least one round is needed");
+    let library = match &arguments.embree {
+        Some(path) => path.clone(),
+        None => find_embree(Path::new(".venv-bench"))
+            .context("no libembree4 found below .venv-bench; scripts/bench installs it")?,
+    };
+    let mut devices = vec![Embree::load(&library, 1)?];
+    if kinds.contains(&Kind::Build) {
+        for &count in threads.iter().filter(|&&t| t > 1) {
+            devices.push(Embree::load(&library, count)?);
+        }
+    }
+    Ok(Plan { kinds, engines: arguments.engines.clone(), threads, budget, sizes, devices })
+}
+
+/// The library inside the package that scripts/bench installs.
+fn find_embree(below: &Path) -> Option<PathBuf> {
+    for entry in std::fs::read_dir(below).ok()?.flatten() {
+        let (path, name) = (entry.path(), entry.file_name());
+        if name.to_string_lossy().starts_with("libembree4") {
+            return Some(path);
+        }
+        if entry.file_type().is_ok_and(|t| t.is_dir())
+            && let Some(found) = find_embree(&path)
+        {
+            return Some(found);
+        }
+    }
+    None
+}
+
+fn run_scene(plan: &Plan, scene: &Scene, record: &mut Record) -> anyhow::Result<()> {
+    let mesh = &scene.mesh;
+    eprintln!("{}: {} triangles", mesh.name, mesh.faces.len());
+    let traced: Vec<Kind> = plan.kinds.iter().copied().filter(|&k| k != Kind::Build).collect();
+    if !traced.is_empty() {
+        let filters = traced.iter().any(|k| matches!(k, Kind::AllHits | Kind::FirstHits));
+        let engines = engines(plan, mesh, filters)?;
+        let tracer = &engines[0];
+        let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| tracer.closest(rays, out);
+        let generator = Generator::new(scene, plan.sizes, &trace);
+        for kind in traced {
+            run_workload(plan, mesh, &generator.workload(kind), &engines, record)?;
+        }
+    }
+    if plan.kinds.contains(&Kind::Build) {
+        run_builds(plan, mesh, record);
+    }
+    Ok(())
+}
+
+/// All engines on a mesh, `embree-1` first.
+fn engines(plan: &Plan, mesh: &Mesh, filters: bool) -> anyhow::Result<Vec<Box<dyn Engine>>> {
+    let mut engines: Vec<Box<dyn Engine>> = Vec::new();
+    for robust in [false, true] {
+        let family = if robust { Family::EmbreeRobust } else { Family::Embree };
+        if !plan.wants("robust", family) {
+            continue;
+        }
+        let build = |filter| {
+            let quality = Quality { high: true, robust, filter };
+            EmbreeScene::build(&plan.devices[0], mesh, quality).map(Arc::new)
+        };
+        let scene = build(false)?;
+        for call in [Call::Single, Call::Packet, Call::PacketCoherent] {
+            engines.push(Box::new(EmbreeEngine::new(&scene, call)));
+        }
+        if filters {
+            engines.push(Box::new(EmbreeEngine::new(&build(true)?, Call::Filter)));
+        }
+    }
+    if plan.wants("obvhs", Family::Peer) {
+        engines.push(Box::new(ObvhsPeer::build(mesh)));
+    }
+    if plan.wants("bvh", Family::Peer) {
+        engines.push(Box::new(BvhPeer::build(mesh)));
+    }
+    if plan.wants("parry3d", Family::Peer) {
+        engines.push(Box::new(ParryPeer::build(mesh)?));
+    }
+    Ok(engines)
+}
+
+/// Verifies all engines that answer the workload, then times them for each number of threads.
+fn run_workload(
+    plan: &Plan,
+    mesh: &Mesh,
+    work: &Workload,
+    engines: &[Box<dyn Engine>],
+    record: &mut Record,
+) -> anyhow::Result<()> {
+    let kind = work.kind;
+    if work.rays.is_empty() {
+        record.rows.push(Row {
+            workload: Some(kind),
+            ..Row::error(&mesh.name, "*", "the view sees nothing to start from")
+        });
+        return Ok(());
+    }
+    let able: Vec<&dyn Engine> =
+        engines.iter().map(|e| &**e).filter(|e| e.supports(kind.question())).collect();
+    let strides: Vec<usize> = able.iter().map(|e| calibrate(*e, work, &plan.budget)).collect();
+    let subsets: Vec<Workload> = strides.iter().map(|&s| work.subset(s)).collect();
+    let answers: Vec<Answers> = able
+        .iter()
+        .zip(&subsets)
+        .map(|(engine, work)| {
+            let mut answers = Answers::for_workload(work);
+            answers.fill(*engine, work);
+            answers
+        })
+        .collect();
+    let testimonies: Vec<Testimony> = answers
+        .iter()
+        .zip(&strides)
+        .map(|(answers, &stride)| Testimony { answers, stride })
+        .collect();
+    let verdicts = verify(&Oracle::new(mesh), mesh.faces.len(), work, &testimonies);
+    drop(testimonies);
+    drop(answers);
+
+    let timed: Vec<(&dyn Engine, &Workload)> = able.iter().copied().zip(&subsets).collect();
+    for &threads in &plan.threads {
+        let pool = (threads > 1)
+            .then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build())
+            .transpose()?;
+        let rates = rates(&timed, plan.budget.rounds, pool.as_ref());
+        let rows =
+            timed.iter().zip(rates).zip(&verdicts).map(|(((engine, work), rate), verdict)| {
+                let wrong = verdict.wrong_per_million;
+                let error = if wrong > MAX_WRONG_PER_MILLION {
+                    format!("{wrong:.0} wrong answers in a million")
+                } else {
+                    String::new()
+                };
+                Row {
+                    workload: Some(kind),
+                    family: engine.family(),
+                    level: engine.level().to_owned(),
+                    threads,
+                    rays: work.rays.len(),
+                    rate,
+                    verdict: Some(*verdict),
+                    ..Row::error(&mesh.name, &engine.name(), error)
+                }
+            });
+        record.add(rows.collect());
+        report(record, timed.len());
+    }
+    Ok(())
+}
+
+fn run_builds(plan: &Plan, mesh: &Mesh, record: &mut Record) {
+    let mut builders: Vec<Box<dyn Builder + '_>> = Vec::new();
+    for (high, robust) in [(true, false), (false, false), (true, true)] {
+        let quality = Quality { high, robust, filter: false };
+        builders.push(Box::new(EmbreeBuilder { devices: &plan.devices, mesh, quality }));
+    }
+    builders.push(Box::new(ObvhsBuilder(mesh)));
+    builders.push(Box::new(BvhBuilder(mesh)));
+    builders.push(Box::new(ParryBuilder(mesh)));
+    builders.retain(|b| plan.wants(&b.name(), b.family()));
+    for &threads in &plan.threads {
+        let results = build_rates(&builders, mesh.faces.len(), threads, &plan.budget);
+        let rows: Vec<Row> = builders
+            .iter()
+            .zip(results)
+            .filter_map(|(builder, result)| {
+                // A builder that knows only one thread has no row for more.
+                let (rate, bytes) = match result {
+                    Err(_) if threads > 1 => return None,
+                    Err(error) => {
+                        let row = Row::error(&mesh.name, &builder.name(), format!("{error:#}"));
+                        return Some(Row { workload: Some(Kind::Build), threads, ..row });
+                    }
+                    Ok((rate, bytes)) => (Some(rate), bytes),
+                };
+                Some(Row {
+                    workload: Some(Kind::Build),
+                    family: builder.family(),
+                    threads,
+                    rays: mesh.faces.len(),
+                    rate,
+                    bytes_per_triangle: bytes.map(|b| b as f64 / mesh.faces.len() as f64),
+                    ..Row::error(&mesh.name, &builder.name(), "")
+                })
+            })
+            .collect();
+        let count = rows.len();
+        record.add(rows);
+        report(record, count);
+    }
+}
+
+/// Prints the last rows.
+fn report(record: &Record, count: usize) {
+    for row in &record.rows[record.rows.len() - count..] {
+        let rate = row.rate.map_or(f64::NAN, |r| r.spread.median);
+        let ratio = row.ratio_to_best_embree.map_or("-".into(), |r| format!("{r:.2}x"));
+        let verdict = row.verdict.unwrap_or_default();
+        let bytes = row.bytes_per_triangle.map_or(String::new(), |b| format!(" {b:.0} B/triangle"));
+        eprintln!(
+            "  {:<10} {}t {:<18} {rate:>8.3} M/s {ratio:>6}  {} rays, {:.1} mismatches and {:.1} \
+             wrong per million{bytes} {}",
+            row.workload.map_or("*", Kind::name),
+            row.threads,
+            row.engine,
+            row.rays,
+            verdict.mismatches_per_million,
+            verdict.wrong_per_million,
+            row.error
+        );
+    }
+}
+
+/// The short hash of the checked-out commit, with `+` if the work tree differs from it.
+fn commit() -> String {
+    let git = |arguments: &[&str]| {
+        let output = std::process::Command::new("git").args(arguments).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let Some(hash) = git(&["rev-parse", "--short", "HEAD"]) else { return "unknown".into() };
+    let clean = git(&["status", "--porcelain", "-uno"]).is_some_and(|s| s.is_empty());
+    format!("{hash}{}", if clean { "" } else { "+" })
+}
+
+/// Today's date (UTC), `YYYY-MM-DD`.
+fn today() -> String {
+    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
+    let days = now.map_or(0, |d| d.as_secs() / 86_400) as i64;
+    // Hinnant's civil_from_days, for dates after 1970: years begin in March.
+    let z = days + 719_468;
+    let (era, day_of_era) = (z / 146_097, z % 146_097);
+    let year_of_era =
+        (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
+    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02}")
+}

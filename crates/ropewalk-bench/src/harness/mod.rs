@@ -1,0 +1,21 @@
+//! Verifies, times and records engines on workloads.
+
+mod chart;
+mod clock;
+mod engine;
+mod measure;
+mod oracle;
+mod record;
+mod statistics;
+mod summary;
+mod verify;
+
+pub use chart::chart;
+pub use clock::{Clock, cpu_name};
+pub use engine::{Answer, Answers, Builder, Built, Engine, Family};
+pub use measure::{Budget, Rate, build_rates, calibrate, rates};
+pub use oracle::{Candidate, Oracle};
+pub use record::{Record, Row};
+pub use statistics::{Spread, geometric_mean};
+pub use summary::summary;
+pub use verify::{MAX_WRONG_PER_MILLION, Testimony, Verdict, verify};

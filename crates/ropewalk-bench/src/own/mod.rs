@@ -1,0 +1,1 @@
+//! Ropewalk's own engines, behind the same trait as the peers.

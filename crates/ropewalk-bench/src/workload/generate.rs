@@ -1,0 +1,289 @@
+//! Primary, diffuse, shadow, ambient-occlusion and chord rays of a scene.
+
+use super::{Kind, Random, Workload, walk};
+use crate::answer::BenchHit;
+use crate::scene::Scene;
+use ropewalk::Ray;
+use std::cell::OnceCell;
+
+/// How many rays.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sizes {
+    /// Pixels along a side of the primary picture; a power of two.
+    pub side: usize,
+    /// Chords for all hits and first hits.
+    pub chords: usize,
+    /// Segments of a transport walk; a multiple of [`Sizes::SEGMENTS`].
+    pub walk: usize,
+}
+
+impl Sizes {
+    /// Segments of one walker.
+    pub const SEGMENTS: usize = 64;
+    /// The benchmark proper.
+    pub const FULL: Sizes = Sizes { side: 1024, chords: 65_536, walk: 1 << 20 };
+    /// For trying out.
+    pub const QUICK: Sizes = Sizes { side: 256, chords: 8_192, walk: 1 << 16 };
+}
+
+/// Length of ambient-occlusion rays, in diagonals.
+const AO_LENGTH: f64 = 0.05;
+/// Shadow rays end before the light by this part of their length.
+const SHADOW_END: f64 = 1e-4;
+/// How far an origin is moved off its surface, in diagonals. Large enough that no engine, with
+/// errors of some 10 ulp of the coordinates, hits that surface again from the wrong side.
+const OFFSET: f64 = 1e-5;
+
+/// Makes the workloads of a scene. The tracer answers the nearest hits that secondary rays and
+/// walks start from.
+pub struct Generator<'a> {
+    scene: &'a Scene,
+    sizes: Sizes,
+    trace: &'a dyn Fn(&[Ray], &mut [BenchHit]),
+    surface: OnceCell<Vec<SurfacePoint>>,
+}
+
+/// A primary hit: a point moved off the surface to the side of the eye, and the normal there.
+#[derive(Clone, Copy)]
+struct SurfacePoint {
+    at: [f64; 3],
+    normal: [f64; 3],
+}
+
+impl<'a> Generator<'a> {
+    /// A generator for a scene.
+    pub fn new(scene: &'a Scene, sizes: Sizes, trace: &'a dyn Fn(&[Ray], &mut [BenchHit])) -> Self {
+        Generator { scene, sizes, trace, surface: OnceCell::new() }
+    }
+
+    /// The rays of a workload. [`Kind::Build`] has none; workloads that start on surfaces have
+    /// none where the view sees nothing.
+    pub fn workload(&self, kind: Kind) -> Workload {
+        let mut chains = Vec::new();
+        let rays = match kind {
+            Kind::Primary => self.primary(),
+            Kind::Diffuse => self.diffuse(),
+            Kind::Shadow => self.shadow(),
+            Kind::AmbientOcclusion => self.ambient_occlusion(),
+            Kind::AllHits | Kind::FirstHits => self.chords(),
+            Kind::Walk1 | Kind::Walk02 => {
+                let mean = if kind == Kind::Walk1 { 0.01 } else { 0.002 };
+                let walk = walk::segments(&self.scene.mesh, mean, self.sizes.walk, self.trace);
+                chains = walk.1;
+                walk.0
+            }
+            Kind::Build => Vec::new(),
+        };
+        Workload { kind, rays, chains }
+    }
+
+    fn primary(&self) -> Vec<Ray> {
+        let (view, side) = (&self.scene.view, self.sizes.side);
+        let (eye, at) = (view.eye.map(f64::from), view.at.map(f64::from));
+        let forward = normalize(sub(at, eye));
+        let right = cross(forward, view.up.map(f64::from));
+        let right = if dot(right, right) > 0.0 { right } else { cross(forward, [1.0, 0.0, 0.0]) };
+        let right = normalize(right);
+        let up = cross(right, forward);
+        let half = (f64::from(view.fov_degrees).to_radians() / 2.0).tan();
+        (0..(side * side) as u64)
+            .map(|code| {
+                let (x, y) = (compact_bits(code), compact_bits(code >> 1));
+                let u = half * ((2 * x + 1) as f64 / side as f64 - 1.0);
+                let v = half * (1.0 - (2 * y + 1) as f64 / side as f64);
+                let dir = std::array::from_fn(|a| forward[a] + u * right[a] + v * up[a]);
+                ray(eye, normalize(dir), f64::INFINITY)
+            })
+            .collect()
+    }
+
+    fn surface(&self) -> &[SurfacePoint] {
+        self.surface.get_or_init(|| {
+            let rays = self.primary();
+            let mut hits = vec![BenchHit::MISS; rays.len()];
+            (self.trace)(&rays, &mut hits);
+            let offset = offset(self.scene.mesh.bounds().diagonal());
+            rays.iter()
+                .zip(&hits)
+                .filter(|(_, hit)| hit.is_hit())
+                .filter_map(|(ray, hit)| {
+                    let normal = facing_normal(self.scene.mesh.triangle(hit.prim), ray)?;
+                    let on = ray.at(hit.t);
+                    let at = std::array::from_fn(|a| on[a] + offset * normal[a]);
+                    Some(SurfacePoint { at, normal })
+                })
+                .collect()
+        })
+    }
+
+    fn diffuse(&self) -> Vec<Ray> {
+        let (points, mut random) = (self.surface(), Random::new(2));
+        if points.is_empty() {
+            return Vec::new();
+        }
+        let mut rays: Vec<Ray> = (0..self.sizes.side * self.sizes.side)
+            .map(|i| {
+                let p = points[i % points.len()];
+                ray(p.at, cosine_weighted(p.normal, &mut random), f64::INFINITY)
+            })
+            .collect();
+        random.shuffle(&mut rays);
+        rays
+    }
+
+    fn shadow(&self) -> Vec<Ray> {
+        let light = self.scene.view.light.map(f64::from);
+        let to_light = |p: &SurfacePoint| {
+            let way = sub(light, p.at);
+            let length = dot(way, way).sqrt();
+            ray(p.at, normalize(way), length * (1.0 - SHADOW_END))
+        };
+        self.surface().iter().map(to_light).collect()
+    }
+
+    fn ambient_occlusion(&self) -> Vec<Ray> {
+        let (length, mut random) =
+            (AO_LENGTH * self.scene.mesh.bounds().diagonal(), Random::new(4));
+        let cast = |p: &SurfacePoint| ray(p.at, cosine_weighted(p.normal, &mut random), length);
+        self.surface().iter().map(cast).collect()
+    }
+
+    fn chords(&self) -> Vec<Ray> {
+        let (bounds, mut random) = (self.scene.mesh.bounds(), Random::new(5));
+        let radius = bounds.diagonal() / 2.0;
+        let center: [f64; 3] =
+            std::array::from_fn(|a| (f64::from(bounds.min[a]) + f64::from(bounds.max[a])) / 2.0);
+        let mut on_sphere = || -> [f64; 3] {
+            let d = random.direction();
+            std::array::from_fn(|a| center[a] + radius * d[a])
+        };
+        (0..self.sizes.chords)
+            .map(|_| {
+                let (from, to) = (on_sphere(), on_sphere());
+                ray(from, normalize(sub(to, from)), f64::INFINITY)
+            })
+            .collect()
+    }
+}
+
+/// How far an origin on a surface is moved off it in a scene of this diagonal.
+pub(super) fn offset(diagonal: f64) -> f64 {
+    OFFSET * diagonal
+}
+
+/// The unit normal of a triangle on the side that a ray arrives from; `None` without area.
+pub(super) fn facing_normal(corners: [[f32; 3]; 3], ray: &Ray) -> Option<[f64; 3]> {
+    let [a, b, c] = corners.map(|v| v.map(f64::from));
+    let normal = cross(sub(b, a), sub(c, a));
+    let length = dot(normal, normal).sqrt();
+    let facing = dot(normal, ray.dir.map(f64::from));
+    let scale = if facing > 0.0 { -1.0 } else { 1.0 } / length;
+    (length > 0.0).then(|| normal.map(|x| x * scale))
+}
+
+/// A ray over `0 ..= t_max`, rounded to `f32`.
+pub(super) fn ray(origin: [f64; 3], dir: [f64; 3], t_max: f64) -> Ray {
+    Ray::new(origin.map(|x| x as f32), dir.map(|x| x as f32)).with_range(0.0, t_max as f32)
+}
+
+/// A direction about `normal` with density proportional to the cosine: a point of the unit sphere
+/// moved by the normal (Shirley).
+fn cosine_weighted(normal: [f64; 3], random: &mut Random) -> [f64; 3] {
+    let on_sphere = random.direction();
+    let sum: [f64; 3] = std::array::from_fn(|a| normal[a] + on_sphere[a]);
+    // The point opposite to the normal gives no direction.
+    if dot(sum, sum) > 1e-12 { normalize(sum) } else { normal }
+}
+
+/// Gathers the even bits of a Morton code.
+fn compact_bits(code: u64) -> u64 {
+    (0..32).fold(0, |out, bit| out | ((code >> (2 * bit)) & 1) << bit)
+}
+
+pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn normalize(v: [f64; 3]) -> [f64; 3] {
+    let length = dot(v, v).sqrt();
+    v.map(|x| x / length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::harness::Oracle;
+    use crate::scene::{Mesh, View};
+
+    /// Two walls and a floor, seen from between them.
+    fn corner() -> Scene {
+        let vertices = vec![
+            [0.0, 0.0, 0.0],
+            [4.0, 0.0, 0.0],
+            [0.0, 4.0, 0.0],
+            [0.0, 0.0, 4.0],
+            [4.0, 4.0, 0.0],
+        ];
+        let faces = vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 4, 2]];
+        Scene {
+            mesh: Mesh { name: "corner".into(), vertices, faces },
+            view: View {
+                eye: [3.0, 2.5, 3.5],
+                at: [0.0; 3],
+                up: [0.0, 1.0, 0.0],
+                fov_degrees: 60.0,
+                light: [1.0, 3.0, 1.5],
+            },
+        }
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_rays_and_all_are_sound() {
+        let scene = corner();
+        let oracle = Oracle::new(&scene.mesh);
+        let trace = |rays: &[Ray], out: &mut [BenchHit]| {
+            for (ray, hit) in rays.iter().zip(out) {
+                *hit = oracle.exact(ray).first().copied().unwrap_or(BenchHit::MISS);
+            }
+        };
+        let sizes = Sizes { side: 32, chords: 100, walk: 4 * Sizes::SEGMENTS };
+        let make = |kind| Generator::new(&scene, sizes, &trace).workload(kind);
+        for kind in Kind::ALL {
+            let work = make(kind);
+            assert_eq!(work, make(kind), "{}", kind.name());
+            assert_eq!(work.rays.is_empty(), kind == Kind::Build);
+            for ray in &work.rays {
+                assert!(ray.is_valid() && ray.t_min == 0.0);
+                let length: f32 = ray.dir.iter().map(|x| x * x).sum();
+                assert!((length - 1.0).abs() < 1e-6);
+            }
+        }
+        assert_eq!(make(Kind::Diffuse).rays.len(), 1024);
+        assert_ne!(make(Kind::Diffuse).rays, make(Kind::AmbientOcclusion).rays);
+        assert!(make(Kind::AmbientOcclusion).rays.iter().all(|r| r.t_max < 0.5));
+        assert!(make(Kind::Walk1).chains.len() >= 4);
+    }
+
+    #[test]
+    fn sixteen_primary_rays_in_turn_are_a_block_of_pixels() {
+        let block: Vec<_> = (16..32).map(|c| (compact_bits(c), compact_bits(c >> 1))).collect();
+        assert!(block.iter().all(|&(x, y)| (4..8).contains(&x) && y < 4));
+    }
+
+    #[test]
+    fn cosine_weighted_directions_have_the_mean_of_the_lambertian() {
+        let (normal, mut random) = ([0.0, 0.6, 0.8], Random::new(3));
+        let mean: f64 =
+            (0..50_000).map(|_| dot(cosine_weighted(normal, &mut random), normal)).sum::<f64>();
+        // The mean cosine is 2/3.
+        assert!((mean / 50_000.0 - 2.0 / 3.0).abs() < 0.01);
+    }
+}
