@@ -5,7 +5,7 @@ CARGO ?= cargo
 OUT ?= out
 FUZZ_SECONDS ?= 60
 
-.PHONY: help demo test check fmt clippy unit doc fuzz bench-build clean
+.PHONY: help demo test check fmt clippy unit doc fuzz bench bench-build clean
 
 help: ## List the commands
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -44,6 +44,9 @@ doc: tools
 
 fuzz: tools ## Fuzz the NFF reader for FUZZ_SECONDS (needs a nightly toolchain)
 	@scripts/fuzz $(FUZZ_SECONDS)
+
+bench: tools ## Rays per second against Embree and other peers, recorded under bench/record
+	@scripts/bench
 
 bench-build: tools ## Time the builder from 10^4 to 10^6 triangles
 	@$(CARGO) run --release --locked --quiet -p ropewalk-bench --bin build

@@ -4,14 +4,15 @@ use anyhow::Context;
 use clap::Parser;
 use ropewalk_bench::answer::BenchHit;
 use ropewalk_bench::harness::{
-    Answers, Budget, Builder, Engine, Family, MAX_WRONG_PER_MILLION, Oracle, Record, Row,
-    Testimony, build_rates, calibrate, chart, cpu_name, rates, summary, verify,
+    Answers, Budget, Builder, Engine, Family, Oracle, Record, Row, Testimony, build_rates,
+    calibrate, chart, cpu_name, max_wrong_per_million, rates, summary, verify,
 };
+use ropewalk_bench::own::{TaB, TaBBuilder};
 use ropewalk_bench::peer::{
     BvhBuilder, BvhPeer, Call, Embree, EmbreeBuilder, EmbreeEngine, EmbreeScene, ObvhsBuilder,
     ObvhsPeer, ParryBuilder, ParryPeer, Quality,
 };
-use ropewalk_bench::scene::{Catalog, Mesh, Scene};
+use ropewalk_bench::scene::{Catalog, Mesh, Scene, SceneEntry};
 use ropewalk_bench::workload::{Generator, Kind, Sizes, Workload};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -47,6 +48,9 @@ struct Arguments {
     /// The folder of generated scenes.
     #[arg(long, default_value = "target/bench-scenes")]
     generated: PathBuf,
+    /// Write each scene's view as NAME.pgm to this folder and measure nothing.
+    #[arg(long)]
+    pictures: Option<PathBuf>,
     /// Where the record goes.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -86,6 +90,9 @@ fn run(arguments: &Arguments) -> anyhow::Result<bool> {
     let entries = Catalog::select(&arguments.scenes)?;
     let catalog = Catalog { data: arguments.data.clone(), generated: arguments.generated.clone() };
     let plan = plan(arguments)?;
+    if let Some(folder) = &arguments.pictures {
+        return pictures(&plan, &catalog, &entries, folder);
+    }
     let mut record = Record {
         cpu: cpu_name(),
         commit: commit(),
@@ -119,6 +126,28 @@ fn run(arguments: &Arguments) -> anyhow::Result<bool> {
     println!("{}", summary(&record));
     println!("record: {}   chart: {}", dated.display(), out.join("latest.svg").display());
     Ok(record.rows.iter().all(|r| r.error.is_empty()))
+}
+
+/// Grey pictures of the views: dark where a surface is seen edge-on, black where nothing is.
+fn pictures(
+    plan: &Plan,
+    catalog: &Catalog,
+    entries: &[SceneEntry],
+    folder: &Path,
+) -> anyhow::Result<bool> {
+    std::fs::create_dir_all(folder)?;
+    for entry in entries {
+        let scene = catalog.load(entry)?;
+        let quality = Quality { high: false, robust: true, filter: false };
+        let tree = Arc::new(EmbreeScene::build(&plan.devices[0], &scene.mesh, quality)?);
+        let engine = EmbreeEngine::new(&tree, Call::Single);
+        let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engine.closest(rays, out);
+        let grey = Generator::new(&scene, plan.sizes, &trace).picture();
+        let mut file = format!("P5 {0} {0} 255\n", plan.sizes.side).into_bytes();
+        file.extend(grey);
+        std::fs::write(folder.join(format!("{}.pgm", entry.name)), file)?;
+    }
+    Ok(true)
 }
 
 fn plan(arguments: &Arguments) -> anyhow::Result<Plan> {
@@ -224,6 +253,9 @@ fn engines(plan: &Plan, mesh: &Mesh, filters: bool) -> anyhow::Result<Vec<Box<dy
     if plan.wants("parry3d", Family::Peer) {
         engines.push(Box::new(ParryPeer::build(mesh)?));
     }
+    if plan.wants("ropewalk-ta-b", Family::Own) {
+        engines.push(Box::new(TaB::build(mesh, 1)?));
+    }
     Ok(engines)
 }
 
@@ -274,7 +306,7 @@ fn run_workload(
         let rows =
             timed.iter().zip(rates).zip(&verdicts).map(|(((engine, work), rate), verdict)| {
                 let wrong = verdict.wrong_per_million;
-                let error = if wrong > MAX_WRONG_PER_MILLION {
+                let error = if wrong > max_wrong_per_million(engine.family()) {
                     format!("{wrong:.0} wrong answers in a million")
                 } else {
                     String::new()
@@ -305,6 +337,7 @@ fn run_builds(plan: &Plan, mesh: &Mesh, record: &mut Record) {
     builders.push(Box::new(ObvhsBuilder(mesh)));
     builders.push(Box::new(BvhBuilder(mesh)));
     builders.push(Box::new(ParryBuilder(mesh)));
+    builders.push(Box::new(TaBBuilder(mesh)));
     builders.retain(|b| plan.wants(&b.name(), b.family()));
     for &threads in &plan.threads {
         let results = build_rates(&builders, mesh.faces.len(), threads, &plan.budget);

@@ -18,4 +18,4 @@ pub use oracle::{Candidate, Oracle};
 pub use record::{Record, Row};
 pub use statistics::{Spread, geometric_mean};
 pub use summary::summary;
-pub use verify::{MAX_WRONG_PER_MILLION, Testimony, Verdict, verify};
+pub use verify::{Testimony, Verdict, max_wrong_per_million, verify};

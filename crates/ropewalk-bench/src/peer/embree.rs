@@ -336,7 +336,7 @@ pub struct EmbreeScene {
     quality: Quality,
     /// The commit: CPU and wall seconds.
     seconds: (f64, f64),
-    /// Bytes of tree, vertices and indices.
+    /// Bytes of the tree with its own triangles; the caller's vertices and indices left out.
     bytes: usize,
 }
 
@@ -355,10 +355,9 @@ impl EmbreeScene {
         let level = if quality.high { QUALITY_HIGH } else { QUALITY_MEDIUM };
         let flags = if quality.robust { SCENE_ROBUST } else { 0 }
             | if quality.filter { SCENE_FILTER_IN_ARGUMENTS } else { 0 };
-        let before = embree.bytes.load(Relaxed);
         // SAFETY: the handles are used in the documented order; the buffers that Embree returns
         // hold as many items as asked for, and are checked for null before they are written.
-        let (scene, clock) = unsafe {
+        let (scene, clock, before) = unsafe {
             let scene = (api.rtcNewScene)(embree.device);
             (api.rtcSetSceneBuildQuality)(scene, level);
             (api.rtcSetSceneFlags)(scene, flags);
@@ -375,9 +374,10 @@ impl EmbreeScene {
             (api.rtcCommitGeometry)(geometry);
             (api.rtcAttachGeometry)(scene, geometry);
             (api.rtcReleaseGeometry)(geometry);
+            let before = embree.bytes.load(Relaxed);
             let clock = Clock::start();
             (api.rtcCommitScene)(scene);
-            (scene, clock)
+            (scene, clock, before)
         };
         let seconds = clock.elapsed();
         let bytes = (embree.bytes.load(Relaxed) - before).max(0) as usize;

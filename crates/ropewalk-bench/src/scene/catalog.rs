@@ -1,7 +1,9 @@
 //! The scenes of the benchmark, none of which may be left out of a full run.
 
 use super::mesh::{Mesh, MeshError, Scene, View};
+use super::spd::tessellate;
 use anyhow::Context;
+use ropewalk_scene::spd::Spd;
 use std::path::PathBuf;
 
 /// Where a scene comes from.
@@ -11,6 +13,8 @@ enum Source {
     Shared(&'static str, ViewFrom),
     /// `NAME.ply` and `NAME.cam` as written by the study's generator script.
     Study,
+    /// A scene of the Standard Procedural Databases at a size factor, as triangles.
+    Tessellated(Spd, u32),
 }
 
 /// How the view of a shared file is found.
@@ -39,35 +43,61 @@ const ORBIT_FOV: f32 = 45.0;
 const Y: [f32; 3] = [0.0, 1.0, 0.0];
 const Z: [f32; 3] = [0.0, 0.0, 1.0];
 
-use Source::{Shared, Study};
+use Source::{Shared, Study, Tessellated};
 use ViewFrom::{Inside, Outside};
 
 const ENTRIES: &[SceneEntry] = &[
     SceneEntry { name: "bunny", source: Shared("mesh/bunny.ply.gz", Outside([0.3, 0.4, 1.0])) },
     SceneEntry { name: "dragon", source: Shared("mesh/dragon.ply.gz", Outside([0.4, 0.5, 1.0])) },
     SceneEntry { name: "scallop", source: Shared("mesh/scallop.glb.gz", Outside([0.2, 0.8, 1.0])) },
-    SceneEntry { name: "sponza", source: Shared("scene/sponza.ply.gz", Outside([1.0, 0.5, 0.2])) },
+    SceneEntry {
+        name: "sponza",
+        source: Shared(
+            "scene/sponza.ply.gz",
+            Inside([-10.0, 2.0, -0.4], [5.0, 4.5, 0.6], Y, 65.0, [0.5, 12.0, 0.3]),
+        ),
+    },
     SceneEntry {
         name: "kitchen_country",
-        source: Shared("scene/kitchen_country.ply.gz", Outside([1.0, 0.5, 0.2])),
+        source: Shared(
+            "scene/kitchen_country.ply.gz",
+            Inside([1.1, 1.7, 2.8], [-1.3, 0.9, -0.8], Y, 60.0, [0.5, 2.6, 1.0]),
+        ),
     },
     SceneEntry {
         name: "vianney_house",
-        source: Shared("scene/vianney_house.ply.gz", Outside([1.0, 0.5, 0.2])),
+        source: Shared(
+            "scene/vianney_house.ply.gz",
+            Inside([-36.0, 38.4, 13.3], [10.0, 36.0, 11.0], Z, 65.0, [2.8, 37.2, 13.8]),
+        ),
     },
-    SceneEntry { name: "munich", source: Shared("scene/munich.ply.gz", Outside([1.0, 0.5, 0.2])) },
+    SceneEntry {
+        name: "munich",
+        source: Shared(
+            "scene/munich.ply.gz",
+            Inside([350.0, -500.0, 200.0], [0.0, -80.0, 0.0], Z, 55.0, [300.0, -100.0, 800.0]),
+        ),
+    },
     SceneEntry {
         name: "teapot_in_munich",
-        source: Shared("scene/teapot_in_munich.ply.gz", Outside([1.0, 0.5, 0.2])),
+        source: Shared(
+            "scene/teapot_in_munich.ply.gz",
+            Inside([100.35, 50.4, 0.2], [100.0, 50.0, 0.1], Z, 60.0, [110.0, 45.0, 60.0]),
+        ),
     },
     SceneEntry {
         name: "oa_am_underworks2",
-        source: Shared("scene/oa_am_underworks2.ply.gz", Outside([1.0, 0.5, 0.2])),
+        source: Shared(
+            "scene/oa_am_underworks2.ply.gz",
+            Inside([160.0, 1170.0, 70.0], [-40.0, 200.0, -150.0], Z, 70.0, [0.0, 1100.0, 60.0]),
+        ),
     },
     SceneEntry { name: "atrium", source: Study },
     SceneEntry { name: "sphereflake", source: Study },
     SceneEntry { name: "soup1m", source: Study },
     SceneEntry { name: "stadium", source: Study },
+    // 7,381 spheres and a floor: 5,314,322 triangles.
+    SceneEntry { name: "spd-balls-5m", source: Tessellated(Spd::Balls, 4) },
 ];
 
 /// The list of scenes and the folders that hold them.
@@ -119,6 +149,7 @@ impl Catalog {
                 };
                 Ok(Scene { mesh, view })
             }
+            Tessellated(spd, size) => tessellate(entry.name, spd, size),
             Study => {
                 let file = |ext| self.generated.join(format!("{}.{ext}", entry.name));
                 let mesh = Mesh::read(entry.name, &file("ply"))
@@ -170,7 +201,8 @@ mod tests {
     fn an_absent_scene_is_an_error() {
         let dir = tempfile::tempdir().unwrap();
         let catalog = Catalog { data: dir.path().into(), generated: dir.path().into() };
-        for entry in Catalog::entries() {
+        let files = |e: &&SceneEntry| !matches!(e.source, Tessellated(..));
+        for entry in Catalog::entries().iter().filter(files) {
             assert!(catalog.load(entry).is_err(), "{}", entry.name);
         }
     }

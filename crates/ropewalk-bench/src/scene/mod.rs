@@ -4,6 +4,7 @@ mod catalog;
 mod glb;
 mod mesh;
 mod ply;
+mod spd;
 
 pub use catalog::{Catalog, SceneEntry};
 pub use mesh::{Mesh, MeshError, Scene, View};

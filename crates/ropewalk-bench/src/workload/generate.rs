@@ -97,6 +97,21 @@ impl<'a> Generator<'a> {
             .collect()
     }
 
+    /// The view in shades of grey, row by row: the cosine between ray and surface, 0 for a miss.
+    pub fn picture(&self) -> Vec<u8> {
+        let (rays, side) = (self.primary(), self.sizes.side as u64);
+        let mut hits = vec![BenchHit::MISS; rays.len()];
+        (self.trace)(&rays, &mut hits);
+        let mut grey = vec![0; rays.len()];
+        for (code, (ray, hit)) in (0..).zip(rays.iter().zip(&hits)).filter(|(_, r)| r.1.is_hit()) {
+            let at = (compact_bits(code >> 1) * side + compact_bits(code)) as usize;
+            let normal = facing_normal(self.scene.mesh.triangle(hit.prim), ray);
+            let cosine = normal.map_or(0.0, |n| -dot(n, ray.dir.map(f64::from)));
+            grey[at] = 55 + (200.0 * cosine) as u8;
+        }
+        grey
+    }
+
     fn surface(&self) -> &[SurfacePoint] {
         self.surface.get_or_init(|| {
             let rays = self.primary();
