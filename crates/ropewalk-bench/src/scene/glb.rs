@@ -1,7 +1,7 @@
 //! GLB (binary glTF 2.0): the triangles of all meshes. Nodes with a transform are refused, since
 //! no scene of the benchmark has one.
 
-use super::mesh::MeshError;
+use super::mesh::{MeshError, Parts};
 use anyhow::{Context, bail};
 use serde_json::Value;
 
@@ -16,7 +16,7 @@ const F32: u64 = 5126;
 const TRIANGLES: u64 = 4;
 
 /// Vertices and faces of a GLB file.
-pub(super) fn parse(bytes: &[u8]) -> Result<(Vec<[f32; 3]>, Vec<[u32; 3]>), MeshError> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Parts, MeshError> {
     let (mut json, mut bin) = (None, &[][..]);
     let mut rest = bytes.get(12..).context("the GLB header is cut short")?;
     while let Some((head, tail)) = rest.split_first_chunk::<8>() {

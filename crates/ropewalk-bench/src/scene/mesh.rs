@@ -42,6 +42,9 @@ pub struct Scene {
     pub view: View,
 }
 
+/// Vertices and faces as a file states them.
+pub(super) type Parts = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
 /// Why a mesh could not be read.
 pub type MeshError = anyhow::Error;
 

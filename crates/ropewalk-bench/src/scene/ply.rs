@@ -1,6 +1,6 @@
 //! PLY, ascii or binary little-endian: vertex positions and faces, polygons fanned.
 
-use super::mesh::MeshError;
+use super::mesh::{MeshError, Parts};
 use anyhow::{Context, bail};
 
 /// A scalar type of a property.
@@ -78,7 +78,7 @@ fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], MeshError> {
 }
 
 /// Vertices and faces of a PLY file.
-pub(super) fn parse(bytes: &[u8]) -> Result<(Vec<[f32; 3]>, Vec<[u32; 3]>), MeshError> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Parts, MeshError> {
     const END: &[u8] = b"end_header";
     let end = bytes.windows(END.len()).position(|w| w == END).context("no PLY header found")?;
     let line = end + bytes[end..].iter().position(|&b| b == b'\n').context("no data")? + 1;
