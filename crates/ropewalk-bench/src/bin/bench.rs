@@ -63,8 +63,10 @@ struct Plan {
     threads: Vec<usize>,
     budget: Budget,
     sizes: Sizes,
-    /// The device for tracing first, then one for each other number of threads for builds.
-    devices: Vec<Arc<Embree>>,
+    /// Embree's library.
+    library: PathBuf,
+    /// The device for tracing and for builds with one thread.
+    device: Arc<Embree>,
 }
 
 impl Plan {
@@ -98,7 +100,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<bool> {
         commit: commit(),
         settings: format!(
             "Embree {} high; rounds {}; clock {}; side {}; {}",
-            plan.devices[0].version(),
+            plan.device.version(),
             plan.budget.rounds,
             "thread CPU (1 thread), wall (more)",
             plan.sizes.side,
@@ -121,6 +123,10 @@ fn run(arguments: &Arguments) -> anyhow::Result<bool> {
         }
         Record::write(&dated, &record.csv())?;
     }
+    if plan.kinds.contains(&Kind::Build) {
+        run_parallel_builds(&plan, &catalog, &entries, &mut record)?;
+    }
+    Record::write(&dated, &record.csv())?;
     Record::write(&out.join("latest.csv"), &record.csv())?;
     Record::write(&out.join("latest.svg"), &chart(&record))?;
     println!("{}", summary(&record));
@@ -139,7 +145,7 @@ fn pictures(
     for entry in entries {
         let scene = catalog.load(entry)?;
         let quality = Quality { high: false, robust: true, filter: false };
-        let tree = Arc::new(EmbreeScene::build(&plan.devices[0], &scene.mesh, quality)?);
+        let tree = Arc::new(EmbreeScene::build(&plan.device, &scene.mesh, quality)?);
         let engine = EmbreeEngine::new(&tree, Call::Single);
         let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engine.closest(rays, out);
         let grey = Generator::new(&scene, plan.sizes, &trace).picture();
@@ -179,13 +185,9 @@ fn plan(arguments: &Arguments) -> anyhow::Result<Plan> {
         None => find_embree(Path::new(".venv-bench"))
             .context("no libembree4 found below .venv-bench; scripts/bench installs it")?,
     };
-    let mut devices = vec![Embree::load(&library, 1)?];
-    if kinds.contains(&Kind::Build) {
-        for &count in threads.iter().filter(|&&t| t > 1) {
-            devices.push(Embree::load(&library, count)?);
-        }
-    }
-    Ok(Plan { kinds, engines: arguments.engines.clone(), threads, budget, sizes, devices })
+    let device = Embree::load(&library, 1)?;
+    let engines = arguments.engines.clone();
+    Ok(Plan { kinds, engines, threads, budget, sizes, library, device })
 }
 
 /// The library inside the package that scripts/bench installs.
@@ -218,8 +220,26 @@ fn run_scene(plan: &Plan, scene: &Scene, record: &mut Record) -> anyhow::Result<
             run_workload(plan, mesh, &generator.workload(kind), &engines, record)?;
         }
     }
-    if plan.kinds.contains(&Kind::Build) {
-        run_builds(plan, mesh, record);
+    if plan.kinds.contains(&Kind::Build) && plan.threads.contains(&1) {
+        run_builds(plan, mesh, &plan.device, 1, record);
+    }
+    Ok(())
+}
+
+/// Builds with more threads, after everything else: the worker threads of Embree's device spin as
+/// long as it is open.
+fn run_parallel_builds(
+    plan: &Plan,
+    catalog: &Catalog,
+    entries: &[SceneEntry],
+    record: &mut Record,
+) -> anyhow::Result<()> {
+    for &threads in plan.threads.iter().filter(|&&t| t > 1) {
+        let device = Embree::load(&plan.library, threads)?;
+        // A scene that cannot be loaded has its row already.
+        for scene in entries.iter().filter_map(|entry| catalog.load(entry).ok()) {
+            run_builds(plan, &scene.mesh, &device, threads, record);
+        }
     }
     Ok(())
 }
@@ -234,7 +254,7 @@ fn engines(plan: &Plan, mesh: &Mesh, filters: bool) -> anyhow::Result<Vec<Box<dy
         }
         let build = |filter| {
             let quality = Quality { high: true, robust, filter };
-            EmbreeScene::build(&plan.devices[0], mesh, quality).map(Arc::new)
+            EmbreeScene::build(&plan.device, mesh, quality).map(Arc::new)
         };
         let scene = build(false)?;
         for call in [Call::Single, Call::Packet, Call::PacketCoherent] {
@@ -328,47 +348,43 @@ fn run_workload(
     Ok(())
 }
 
-fn run_builds(plan: &Plan, mesh: &Mesh, record: &mut Record) {
+fn run_builds(plan: &Plan, mesh: &Mesh, device: &Arc<Embree>, threads: usize, record: &mut Record) {
     let mut builders: Vec<Box<dyn Builder + '_>> = Vec::new();
     for (high, robust) in [(true, false), (false, false), (true, true)] {
         let quality = Quality { high, robust, filter: false };
-        builders.push(Box::new(EmbreeBuilder { devices: &plan.devices, mesh, quality }));
+        builders.push(Box::new(EmbreeBuilder { device, mesh, quality }));
     }
     builders.push(Box::new(ObvhsBuilder(mesh)));
     builders.push(Box::new(BvhBuilder(mesh)));
     builders.push(Box::new(ParryBuilder(mesh)));
     builders.push(Box::new(TaBBuilder(mesh)));
-    builders.retain(|b| plan.wants(&b.name(), b.family()));
-    for &threads in &plan.threads {
-        let results = build_rates(&builders, mesh.faces.len(), threads, &plan.budget);
-        let rows: Vec<Row> = builders
-            .iter()
-            .zip(results)
-            .filter_map(|(builder, result)| {
-                // A builder that knows only one thread has no row for more.
-                let (rate, bytes) = match result {
-                    Err(_) if threads > 1 => return None,
-                    Err(error) => {
-                        let row = Row::error(&mesh.name, &builder.name(), format!("{error:#}"));
-                        return Some(Row { workload: Some(Kind::Build), threads, ..row });
-                    }
-                    Ok((rate, bytes)) => (Some(rate), bytes),
-                };
-                Some(Row {
-                    workload: Some(Kind::Build),
-                    family: builder.family(),
-                    threads,
-                    rays: mesh.faces.len(),
-                    rate,
+    // A builder that knows only one thread has no row for more.
+    builders.retain(|b| plan.wants(&b.name(), b.family()) && (threads == 1 || b.is_parallel()));
+    let results = build_rates(&builders, mesh.faces.len(), threads, &plan.budget);
+    let rows: Vec<Row> = builders
+        .iter()
+        .zip(results)
+        .map(|(builder, result)| {
+            let row = Row {
+                workload: Some(Kind::Build),
+                family: builder.family(),
+                threads,
+                rays: mesh.faces.len(),
+                ..Row::error(&mesh.name, &builder.name(), "")
+            };
+            match result {
+                Ok((rate, bytes)) => Row {
+                    rate: Some(rate),
                     bytes_per_triangle: bytes.map(|b| b as f64 / mesh.faces.len() as f64),
-                    ..Row::error(&mesh.name, &builder.name(), "")
-                })
-            })
-            .collect();
-        let count = rows.len();
-        record.add(rows);
-        report(record, count);
-    }
+                    ..row
+                },
+                Err(error) => Row { error: format!("{error:#}"), ..row },
+            }
+        })
+        .collect();
+    let count = rows.len();
+    record.add(rows);
+    report(record, count);
 }
 
 /// Prints the last rows.

@@ -66,6 +66,11 @@ pub trait Builder {
     /// Whose it is.
     fn family(&self) -> Family;
 
+    /// False if it builds with one thread only.
+    fn is_parallel(&self) -> bool {
+        true
+    }
+
     /// Builds once with `threads` threads, drops the result, and says how large it was.
     ///
     /// # Errors

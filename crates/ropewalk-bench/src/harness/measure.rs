@@ -62,11 +62,7 @@ pub fn rates(
         .iter()
         .map(|(_, work)| {
             let pieces = if pool.is_some() { pieces(work) } else { vec![(*work).clone()] };
-            pieces
-                .into_iter()
-                .map(|w| (Answers::for_workload(&w), w))
-                .map(|(a, w)| (w, a))
-                .collect()
+            pieces.into_iter().map(with_room).collect()
         })
         .collect();
     let mut samples = vec![(Vec::new(), Vec::new()); engines.len()];
@@ -88,6 +84,11 @@ pub fn rates(
         }
     }
     samples.iter().map(|(own, wall)| rate(own, wall)).collect()
+}
+
+fn with_room(work: Workload) -> (Workload, Answers) {
+    let answers = Answers::for_workload(&work);
+    (work, answers)
 }
 
 fn rate(own: &[f64], wall: &[f64]) -> Option<Rate> {

@@ -1,4 +1,8 @@
 //! Ropewalk's own engines, behind the same trait as the peers.
+//!
+//! A further engine is a file here that implements [`Engine`](crate::harness::Engine), and
+//! [`Builder`](crate::harness::Builder) for its build times, and a line in each of `engines` and
+//! `run_builds` of the binary.
 
 mod ta_b;
 

@@ -568,8 +568,8 @@ unsafe extern "C" fn collect_first(arguments: *const FilterArguments) {
 
 /// Times builds of one quality.
 pub struct EmbreeBuilder<'a> {
-    /// Devices, one for each number of threads.
-    pub devices: &'a [Arc<Embree>],
+    /// A device that builds with the number of threads that will be asked for.
+    pub device: &'a Arc<Embree>,
     /// The mesh.
     pub mesh: &'a Mesh,
     /// The quality.
@@ -587,9 +587,9 @@ impl Builder for EmbreeBuilder<'_> {
     }
 
     fn build(&self, threads: usize) -> anyhow::Result<Built> {
-        let device = self.devices.iter().find(|d| d.threads == threads);
-        let device = device.with_context(|| format!("no device with {threads} threads"))?;
-        let scene = EmbreeScene::build(device, self.mesh, self.quality)?;
+        let found = self.device.threads;
+        anyhow::ensure!(found == threads, "the device has {found} threads, not {threads}");
+        let scene = EmbreeScene::build(self.device, self.mesh, self.quality)?;
         let (cpu, wall) = scene.seconds;
         let seconds = if threads == 1 { cpu } else { wall };
         Ok(Built { seconds, wall_seconds: wall, bytes: Some(scene.bytes) })

@@ -118,6 +118,10 @@ impl Builder for ObvhsBuilder<'_> {
         Family::Peer
     }
 
+    fn is_parallel(&self) -> bool {
+        false
+    }
+
     fn build(&self, threads: usize) -> anyhow::Result<Built> {
         anyhow::ensure!(threads == 1, "built without its parallel feature");
         let input = triangles(self.0);

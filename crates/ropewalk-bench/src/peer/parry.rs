@@ -87,6 +87,10 @@ impl Builder for ParryBuilder<'_> {
         Family::Peer
     }
 
+    fn is_parallel(&self) -> bool {
+        false
+    }
+
     fn build(&self, threads: usize) -> anyhow::Result<Built> {
         anyhow::ensure!(threads == 1, "the crate builds with one thread");
         let clock = Clock::start();

@@ -1,7 +1,7 @@
 //! The rays of each workload, made from fixed seeds.
 //!
 //! All directions have unit length and all ranges start at 0, since not every peer takes another
-//! start; origins on surfaces are moved off them by [`generate::offset`].
+//! start; origins on surfaces are moved off them by 1e-5 of the diagonal.
 
 mod generate;
 mod random;
