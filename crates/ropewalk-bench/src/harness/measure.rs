@@ -1,7 +1,7 @@
 //! Interleaved rounds.
 
 use super::clock::Clock;
-use super::engine::{Answers, Builder, Engine};
+use super::engine::{Answers, Builder, Engine, Family};
 use super::statistics::Spread;
 use crate::workload::Workload;
 use rayon::ThreadPool;
@@ -14,15 +14,19 @@ pub struct Budget {
     pub rounds: usize,
     /// An engine that needs longer for a round gets a subset of the rays.
     pub seconds_per_round: f64,
+    /// The same for peers other than Embree.
+    pub peer_seconds: f64,
     /// Builds stop after so many seconds for an engine, but not before the third.
     pub build_seconds: f64,
 }
 
 impl Budget {
     /// The benchmark proper.
-    pub const FULL: Budget = Budget { rounds: 7, seconds_per_round: 1.5, build_seconds: 30.0 };
+    pub const FULL: Budget =
+        Budget { rounds: 7, seconds_per_round: 2.0, peer_seconds: 0.4, build_seconds: 30.0 };
     /// For trying out.
-    pub const QUICK: Budget = Budget { rounds: 3, seconds_per_round: 0.3, build_seconds: 1.0 };
+    pub const QUICK: Budget =
+        Budget { rounds: 3, seconds_per_round: 0.3, peer_seconds: 0.1, build_seconds: 1.0 };
 }
 
 /// A measured rate in millions of rays (or triangles built) per second.
@@ -47,7 +51,11 @@ pub fn calibrate(engine: &dyn Engine, work: &Workload, budget: &Budget) -> usize
     let clock = Clock::start();
     answers.fill(engine, &sample);
     let per_ray = clock.elapsed().0 / sample.rays.len().max(1) as f64;
-    let strides = (per_ray * work.rays.len() as f64 / budget.seconds_per_round).ceil() as usize;
+    let seconds = match engine.family() {
+        Family::Peer => budget.peer_seconds,
+        _ => budget.seconds_per_round,
+    };
+    let strides = (per_ray * work.rays.len() as f64 / seconds).ceil() as usize;
     strides.clamp(1, blocks)
 }
 
@@ -149,7 +157,6 @@ pub fn build_rates(
 mod tests {
     use super::*;
     use crate::answer::BenchHit;
-    use crate::harness::Family;
     use crate::workload::{Kind, Question};
     use ropewalk::Ray;
     use std::sync::Mutex;
