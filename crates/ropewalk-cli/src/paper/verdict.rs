@@ -116,15 +116,20 @@ impl Verdict {
 }
 
 /// The method that `method` is held against: an ingredient against the exact sweep to which it was
-/// added, ropes on the combined tree against that tree walked from the root, all else against the
+/// added, ropes on a combined tree against that tree walked from the root, all else against the
 /// paper's reference.
 pub fn opponent(method: &MethodResult) -> Option<&'static str> {
     match method.role {
         "reference" => None,
         "ingredient" => Some(Method::EXACT),
-        "combined" if method.roped => Some("combined"),
+        "combined" if method.roped => unroped(method.name),
         _ => Some(Method::REFERENCE),
     }
+}
+
+/// The name of the same tree walked from the root.
+fn unroped(name: &'static str) -> Option<&'static str> {
+    name.strip_suffix("-rope-trees").or_else(|| name.strip_suffix("-ropes"))
 }
 
 /// The verdicts on all methods but the reference and the naive search, in the order of the report.
@@ -427,6 +432,8 @@ mod tests {
         assert_eq!(against(Method::EXACT), Some(Method::REFERENCE));
         assert_eq!(against("combined"), Some(Method::REFERENCE));
         assert_eq!(against("combined-ropes"), Some("combined"));
+        assert_eq!(against("combined-rope-trees"), Some("combined"));
+        assert!(verdicts.iter().all(|v| scenes[0].method(v.against).is_some()));
         assert_eq!(against(Method::REFERENCE), None);
         assert_eq!(against("naive"), None);
         assert!(verdicts.iter().all(|v| v.all_steps.is_some() == v.method.contains("rope")));

@@ -37,20 +37,11 @@ fn table(experiment: &Experiment) -> String {
             "bytes a leaf",
         ],
     );
-    let names = [
-        "macdonald-booth",
-        "ta-b",
-        "ropes",
-        "rope-trees",
-        "combined",
-        "combined-ropes",
-        "combined-rope-trees",
-    ];
-    for name in names {
+    let Some(first) = experiment.scenes.first() else { return String::new() };
+    let roped = || experiment.verdicts.iter().filter(|v| v.all_steps.is_some());
+    let shown = |name: &str| roped().any(|v| v.method == name || v.against == name);
+    for name in first.methods.iter().map(|m| m.name).filter(|name| shown(name)) {
         let found: Vec<_> = experiment.scenes.iter().filter_map(|s| s.method(name)).collect();
-        if found.is_empty() {
-            continue;
-        }
         let over = |pick: fn(&MethodResult) -> f64| {
             Some(mean(&found.iter().map(|m| pick(m)).collect::<Vec<_>>()))
         };
