@@ -49,7 +49,7 @@ bench: tools ## Rays per second against Embree and other peers, recorded under b
 	@scripts/bench
 
 bench-build: tools ## Time the builder from 10^4 to 10^6 triangles
-	@$(CARGO) run --release --locked --quiet -p ropewalk-bench --bin build
+	@$(CARGO) run --release --locked --quiet -p ropewalk-bench --bin build_speed
 
 clean: ## Remove everything made here
 	@rm -rf $(OUT) target

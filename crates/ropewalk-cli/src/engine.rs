@@ -52,7 +52,7 @@ pub fn build(geometry: &Arc<Geometry>, method: &Method, threads: usize) -> anyho
     let start = Instant::now();
     // Brute force needs no tree; an accelerator always holds one, so it gets a single leaf.
     let one_leaf = BuildSettings {
-        termination: Termination::Fixed { leaf_size: 0, max_depth: Some(0) },
+        termination: Termination::Fixed { leaf_size: 1, max_depth: Some(0) },
         late_cutting: false,
         ..BuildSettings::default()
     };

@@ -1,0 +1,184 @@
+//! `render`, `scene`, `stats` and `validate` through the command: output, files and exit codes.
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+fn ropewalk(folder: &Path, args: &[&str]) -> Output {
+    let program = env!("CARGO_BIN_EXE_ropewalk");
+    Command::new(program).current_dir(folder).args(args).output().expect("the command starts")
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name();
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|e| name(e).into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+fn has_numbers(json: &Value, block: &str, keys: &[&str]) {
+    for key in keys {
+        assert!(json[block][key].is_number(), "{block}.{key} in {json}");
+    }
+}
+
+const TREE: [&str; 7] =
+    ["inner_nodes", "leaves", "empty_leaves", "references", "depth", "bytes", "build_seconds"];
+
+#[test]
+fn render_writes_all_pictures_and_prints_one_object() {
+    let folder = tempfile::tempdir().unwrap();
+    let aov = "depth,normal,steps,tests";
+    let args = ["render", "spd:balls:2", "--size", "64x48", "-o", "a.png", "--aov", aov, "--json"];
+    let output = ropewalk(folder.path(), &args);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let rays = ["primary", "primary_hits", "reflection", "refraction", "shadow", "shadow_hits"];
+    has_numbers(&json, "rays", &rays);
+    has_numbers(&json, "tree", &TREE);
+    let events = [
+        "intersection_tests",
+        "traversal_steps",
+        "leaf_visits",
+        "empty_leaf_visits",
+        "rope_crossings",
+        "rope_tree_steps",
+    ];
+    has_numbers(&json, "per_ray", &events);
+    has_numbers(&json, "seconds", &["read", "build", "trace"]);
+    assert_eq!(json["rays"]["primary"], 64 * 48);
+    let expected = ["a.depth.png", "a.normal.png", "a.png", "a.steps.png", "a.tests.png"];
+    assert_eq!(files(folder.path()), expected);
+}
+
+#[test]
+fn every_method_renders_the_same_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |method: &str| {
+        let args = ["render", "spd:rings:1", "--size", "40x40", "-o", "a.png", "--method", method];
+        let output = ropewalk(folder.path(), &args);
+        assert!(output.status.success(), "{method}: {}", stderr(&output));
+        std::fs::read(folder.path().join("a.png")).unwrap()
+    };
+    let expected = render("naive");
+    for method in ropewalk::method::Method::all() {
+        assert!(render(method.name) == expected, "{} differs from naive", method.name);
+    }
+}
+
+#[test]
+fn spd_rules_shoot_corner_rays() {
+    let folder = tempfile::tempdir().unwrap();
+    let args = ["render", "spd:tetra:3", "--spd-rules", "-o", "a.exr", "--json"];
+    let output = ropewalk(folder.path(), &args);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json["rays"]["primary"], 513 * 513);
+}
+
+#[test]
+fn scene_writes_what_stats_and_validate_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = ropewalk(folder.path(), &["scene", "mount", "--size", "3", "-o", "m.nff"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    for (scene, name) in [("m.nff", "m"), ("spd:mount:3", "spd:mount:3")] {
+        let output = ropewalk(folder.path(), &["stats", scene, "--json"]);
+        let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        assert_eq!(json["scene"], name);
+        assert_eq!(json["primitives"], 132);
+        has_numbers(&json, "tree", &TREE);
+    }
+    let output = ropewalk(folder.path(), &["validate", "m.nff"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(text.contains("rope-trees") && text.contains("ok"), "{text}");
+}
+
+#[test]
+fn the_inputs_fault_is_exit_code_1_and_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("cut.nff", "s 0 0");
+    write("nan.nff", "s 0 0 nan 1");
+    write("many.nff", "p 1000000000\n0 0 0");
+    write("negative.nff", "p -4");
+    write("unknown.nff", "cube 1 2 3");
+    write("empty.nff", "");
+    std::fs::create_dir(folder.path().join("folder.nff")).unwrap();
+    let cases = [
+        ("cut.nff", "cut.nff:1:6: expected a number"),
+        ("nan.nff", "nan.nff:1:7: expected a finite number"),
+        ("many.nff", "many.nff:1:3: "),
+        ("negative.nff", "negative.nff:1:3: expected a whole number"),
+        ("unknown.nff", "unknown.nff:1:1: expected an entity"),
+        ("empty.nff", "empty.nff:1:1: expected at least one object"),
+        ("folder.nff", "folder.nff: expected a scene file, found a directory"),
+        ("absent.nff", "absent.nff: cannot open the scene file"),
+        ("spd:cubes", "spd:cubes: expected a built-in scene (balls, "),
+    ];
+    let before = files(folder.path());
+    for (scene, sentence) in cases {
+        for command in ["render", "stats", "validate"] {
+            let output = ropewalk(folder.path(), &[command, scene]);
+            let text = stderr(&output);
+            assert_eq!(output.status.code(), Some(1), "{command} {scene}: {text}");
+            assert!(text.starts_with(&format!("ropewalk: {sentence}")), "{text}");
+            assert_eq!(text.lines().count(), 1, "{text}");
+        }
+    }
+    assert_eq!(files(folder.path()), before, "a failed command writes nothing");
+}
+
+#[test]
+fn a_wrong_use_is_exit_code_2() {
+    let folder = tempfile::tempdir().unwrap();
+    let cases: [&[&str]; 7] = [
+        &["render"],
+        &["render", "spd:tetra:2", "--method", "magic"],
+        &["render", "spd:tetra:2", "--size", "0x10"],
+        &["render", "spd:tetra:2", "--aov", "heat"],
+        &["scene", "cubes"],
+        &["scene", "tetra", "--size", "99"],
+        &["paint"],
+    ];
+    for args in cases {
+        let output = ropewalk(folder.path(), args);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {}", stderr(&output));
+    }
+    assert!(files(folder.path()).is_empty());
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_is_known_before_tracing() {
+    let folder = tempfile::tempdir().unwrap();
+    for path in ["no/such/folder/a.png", "a.tiff"] {
+        let output = ropewalk(folder.path(), &["render", "spd:tetra:2", "-o", path]);
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    }
+    assert!(files(folder.path()).is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_leaves_the_last_picture_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_ropewalk");
+    let mut child = Command::new(program)
+        .current_dir(folder.path())
+        .args(["render", "spd:balls:3", "--size", "6000x6000", "-o", "a.png"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(1500));
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), Some(1));
+    assert!(files(folder.path()).is_empty(), "{:?}", files(folder.path()));
+}
