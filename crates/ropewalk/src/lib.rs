@@ -22,3 +22,8 @@ pub use accelerator::{Accelerator, AcceleratorError, Walk};
 pub use geometry::{Geometry, GeometryError};
 pub use primitive::{Shape, Sides};
 pub use ray::{Hit, Ray};
+
+/// The README's code runs as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+pub struct Readme;

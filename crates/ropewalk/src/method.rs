@@ -41,6 +41,8 @@ pub struct Method {
 impl Method {
     /// The method that renders when none is named: the best tree, walked by TA-B.
     pub const DEFAULT: &'static str = "best";
+    /// The tree of [`Method::DEFAULT`], walked along rope trees.
+    pub const BEST_ROPE_TREES: &'static str = "best-rope-trees";
     /// The paper's reference.
     pub const REFERENCE: &'static str = "macdonald-booth-1990";
     /// The reference's measure by exact sweep.
@@ -227,7 +229,7 @@ impl Method {
         );
         let title = "f* by projection, perfect splits, both cuttings, ended by cost";
         add(Combined, Self::DEFAULT, title, Some(best.clone()), TaB);
-        add(Combined, "best-rope-trees", "the same tree, rope trees", Some(best), RopeTrees);
+        add(Combined, Self::BEST_ROPE_TREES, "the same tree, rope trees", Some(best), RopeTrees);
         methods
     }
 

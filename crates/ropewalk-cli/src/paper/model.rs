@@ -87,10 +87,13 @@ pub struct Outside {
 }
 
 impl Outside {
-    /// Who needs the fewest operations, where the best tree needs `best`.
-    pub fn winner(&self, best: f64) -> &'static str {
+    /// Who needs the fewest operations, where the best tree needs `best` and all steps along its
+    /// rope trees are `rope_trees`.
+    pub fn winner(&self, best: f64, rope_trees: f64) -> &'static str {
         let (octree, grid) = (self.octree.operations(), self.grid.operations());
-        if best <= octree.min(grid) {
+        if rope_trees <= octree.min(grid).min(best) {
+            "rope trees"
+        } else if best <= octree.min(grid) {
             "best tree"
         } else if grid <= octree {
             "grid"
