@@ -196,20 +196,16 @@ fn scaling(experiment: &Experiment) -> String {
 fn headline(experiment: &Experiment) -> String {
     let h = &experiment.headline;
     let mut out = String::from("Means of the ratios, arithmetic (geometric)\n");
-    let rows = [
-        ("combined / reference", &h.combined),
-        ("combined / exact sweep", &h.combined_to_exact),
-        ("best / reference", &h.best),
-    ];
-    for (name, figures) in rows {
-        let Some(HeadlineFigures { operations, time, size }) = figures else { continue };
+    for (name, figures) in h.rows() {
+        let HeadlineFigures { operations, all_steps, time, size } = figures;
         let show = |s: &super::verdict::Summary| {
             format!("{} ({})", percent(s.mean), percent(s.geometric_mean))
         };
         line!(
             out,
-            "  {name:<24} operations {}, time {}, size {}",
+            "  {name:<32} operations {}, all steps {}, time {}, size {}",
             show(operations),
+            show(all_steps),
             show(time),
             show(size)
         );

@@ -9,7 +9,7 @@ pub fn estimator(experiment: &Experiment) -> String {
     let methods: Vec<_> = first
         .methods
         .iter()
-        .filter(|m| m.role == "ingredient" && m.estimator.is_some())
+        .filter(|m| m.name.starts_with("termination") && m.estimator.is_some())
         .map(|m| m.name)
         .collect();
     if methods.is_empty() {

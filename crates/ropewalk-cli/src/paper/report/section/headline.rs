@@ -2,8 +2,8 @@
 
 use crate::paper::model::Experiment;
 use crate::paper::report::chart;
-use crate::paper::report::html::{Cell, Table, escape, figure, paragraph};
-use crate::paper::verdict::{HeadlineFigures, Summary, Verdict, percent};
+use crate::paper::report::html::{Cell, Table, escape, figure, note, paragraph};
+use crate::paper::verdict::{Headline, Summary, Verdict, percent};
 use ropewalk::method::Method;
 
 /// Title, big numbers, one paragraph, the ratio on each scene.
@@ -40,11 +40,7 @@ pub fn headline(experiment: &Experiment) -> String {
     html += "<div class=\"charts\">\n";
     html += &charts_of_scenes(experiment);
     html += "</div>\n";
-    html += &means(
-        headline.combined.as_ref(),
-        headline.combined_to_exact.as_ref(),
-        headline.best.as_ref(),
-    );
+    html += &means(headline);
     html
 }
 
@@ -69,27 +65,18 @@ fn charts_of_scenes(experiment: &Experiment) -> String {
     figures.map(chart).concat()
 }
 
-fn means(
-    combined: Option<&HeadlineFigures>,
-    to_exact: Option<&HeadlineFigures>,
-    best: Option<&HeadlineFigures>,
-) -> String {
+fn means(headline: &Headline) -> String {
     let mut table = Table::new(
-        "Means of the ratios over the scenes",
-        &["", "operations", "geometric", "time", "geometric", "size", "geometric"],
+        "Means of the ratios over the scenes, arithmetic and geometric",
+        &["", "operations", "geom.", "all steps", "geom.", "time", "geom.", "size", "geom."],
     );
-    let rows = [
-        ("combined / reference", combined),
-        ("combined / exact sweep", to_exact),
-        ("best / reference", best),
-    ];
-    for (name, figures) in rows {
-        let Some(f) = figures else { continue };
+    for (name, f) in headline.rows() {
         let mut cells = vec![Cell::text(name)];
-        for s in [&f.operations, &f.time, &f.size] {
+        for s in [&f.operations, &f.all_steps, &f.time, &f.size] {
             cells.extend([Cell::ratio(Some(s.mean)), Cell::value(Some(s.geometric_mean), 3)]);
         }
         table.row("", &cells);
     }
     table.finish()
+        + &note("All steps add rope crossings and steps in rope trees to the operations.")
 }
