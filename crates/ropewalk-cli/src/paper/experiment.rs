@@ -26,12 +26,13 @@ pub const SLOW_BUILD: f64 = 2.0;
 const MAX_RECORDED: usize = 8 << 20;
 /// Rays over which the cost of a method is looked at beforehand.
 const PROBE_RAYS: usize = 500;
-/// Operations that a method may spend in a timed round; methods of more than about a hundred a ray
-/// are timed on fewer rays.
+/// Operations of a timed round up to which a method is given all timed rays: a hundred a ray of
+/// 100,000.
 const TIMED_OPERATIONS: f64 = 1e7;
-/// Operations that a method may spend while events are counted; only methods of hundreds a ray are
-/// counted over fewer than all rays.
-const COUNTED_OPERATIONS: f64 = 1e9;
+/// Operations over all rays up to which a method's events are counted over all of them.
+const COUNTED_OPERATIONS: f64 = 3e8;
+/// A slower method is given every so many rays, so that it spends this share of the operations.
+const SLOW_SHARE: f64 = 0.2;
 
 /// What all scenes share.
 pub struct Setup<'a> {
@@ -82,9 +83,11 @@ impl Entrant {
         matches!(self.method.walk, Walk::Ropes | Walk::RopeTrees)
     }
 
-    /// `rays`, or as many of them at even distances as a budget of operations affords.
+    /// `rays`, or fewer of them at even distances where they would take more `operations`.
     fn afford(&self, rays: &[RecordedRay], operations: f64) -> Vec<RecordedRay> {
-        evenly(rays, (operations / self.probed.max(1.0)).max(1.0) as usize)
+        let all = self.probed * rays.len() as f64;
+        let share = if all <= operations { 1.0 } else { SLOW_SHARE * operations / all };
+        evenly(rays, (share * rays.len() as f64).ceil() as usize)
     }
 
     /// The leaves from which links are followed: that of the surface which a ray leaves. A renderer

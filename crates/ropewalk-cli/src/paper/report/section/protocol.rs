@@ -29,8 +29,7 @@ pub fn protocol(experiment: &Experiment) -> String {
     ));
     html += &paragraph(&format!(
         "{slow} trees took more than {} seconds and were built once. Methods of more than about a \
-         hundred operations a ray are timed, and of more than several hundreds counted, on an even \
-         subsample of the rays; the naive search tests every object for every ray by definition.",
+         hundred operations a ray are timed and counted on an even subsample of the rays; the naive search tests every object for every ray by definition.",
         p.slow_build_seconds
     ));
     html += &format!(
