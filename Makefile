@@ -21,7 +21,7 @@ demo: tools ## Render a scene to a picture and print what each idea of the 1997 
 	@echo "==> rendering the SPD scene gears:4 (9,345 polygons) by the SPD rules"
 	@./target/release/ropewalk render spd:gears:4 --spd-rules -o $(OUT)/gears.png
 	@echo "==> the paper's experiment on the same scene"
-	@./target/release/ropewalk paper --scenes gears --size standard -o $(OUT)/paper.html
+	@./target/release/ropewalk paper --scenes gears --size standard --rays 20000 --no-sensitivity -o $(OUT)/paper.html
 	@echo "==> picture: $(OUT)/gears.png   report: $(OUT)/paper.html"
 
 test: tools fmt clippy unit doc fuzz ## Everything that CI runs: format, lints, tests, doc tests, docs, fuzz
