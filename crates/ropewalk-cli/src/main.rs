@@ -1,5 +1,7 @@
 //! The `ropewalk` command. Exit codes: 0, 1 (the input's fault), 2 (usage).
 
+#![forbid(unsafe_code)]
+
 mod command;
 mod engine;
 mod interrupt;

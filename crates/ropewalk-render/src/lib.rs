@@ -7,6 +7,8 @@
 //! ones. [`Render::write`] and [`write_image`] write PNG and EXR
 //! files, whole or not at all.
 
+#![forbid(unsafe_code)]
+
 mod aov;
 mod error;
 mod heat_map;

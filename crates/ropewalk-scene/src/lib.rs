@@ -4,6 +4,8 @@
 //! Readers and generators speak to a [`SceneSink`], so that a scene can be held ([`Scene`]),
 //! written to a file as it is made, or merely counted.
 
+#![forbid(unsafe_code)]
+
 mod file;
 mod geometry;
 mod model;

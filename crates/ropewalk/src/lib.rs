@@ -10,12 +10,14 @@ pub mod accelerator;
 pub mod build;
 pub mod cost;
 pub mod geometry;
+pub mod kernel;
 pub mod method;
 pub mod primitive;
 pub mod ray;
 pub mod rope;
 pub mod traverse;
 pub mod tree;
+pub mod wide;
 
 pub use aabb::Aabb;
 pub use accelerator::{Accelerator, AcceleratorError, Walk};

@@ -7,7 +7,7 @@ use ropewalk_bench::harness::{
     Answers, Budget, Builder, Engine, Family, Oracle, Record, Row, Testimony, build_rates,
     calibrate, chart, cpu_name, max_wrong_per_million, rates, summary, verify,
 };
-use ropewalk_bench::own::{TaB, TaBBuilder};
+use ropewalk_bench::own::{TaB, TaBBuilder, Wave, WaveBuilder};
 use ropewalk_bench::peer::{
     BvhBuilder, BvhPeer, Call, Embree, EmbreeBuilder, EmbreeEngine, EmbreeScene, ObvhsBuilder,
     ObvhsPeer, ParryBuilder, ParryPeer, Quality,
@@ -276,6 +276,9 @@ fn engines(plan: &Plan, mesh: &Mesh, filters: bool) -> anyhow::Result<Vec<Box<dy
     if plan.wants("ropewalk-ta-b", Family::Own) {
         engines.push(Box::new(TaB::build(mesh, 1)?));
     }
+    if plan.wants("ropewalk-wave", Family::Own) {
+        engines.push(Box::new(Wave::build(mesh, 1)?));
+    }
     Ok(engines)
 }
 
@@ -358,6 +361,7 @@ fn run_builds(plan: &Plan, mesh: &Mesh, device: &Arc<Embree>, threads: usize, re
     builders.push(Box::new(BvhBuilder(mesh)));
     builders.push(Box::new(ParryBuilder(mesh)));
     builders.push(Box::new(TaBBuilder(mesh)));
+    builders.push(Box::new(WaveBuilder(mesh)));
     // A builder that knows only one thread has no row for more.
     builders.retain(|b| plan.wants(&b.name(), b.family()) && (threads == 1 || b.is_parallel()));
     let results = build_rates(&builders, mesh.faces.len(), threads, &plan.budget);

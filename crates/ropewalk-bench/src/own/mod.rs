@@ -5,5 +5,7 @@
 //! `run_builds` of the binary.
 
 mod ta_b;
+mod wave;
 
 pub use ta_b::{TaB, TaBBuilder};
+pub use wave::{Wave, WaveBuilder};

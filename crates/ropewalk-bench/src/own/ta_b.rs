@@ -45,7 +45,7 @@ impl TaB {
     }
 }
 
-fn geometry(mesh: &Mesh) -> anyhow::Result<Geometry> {
+pub(super) fn geometry(mesh: &Mesh) -> anyhow::Result<Geometry> {
     let mut geometry = Geometry::new();
     for face in 0..mesh.faces.len() as u32 {
         geometry.push(Triangle { vertices: mesh.triangle(face) }, Sides::Both)?;

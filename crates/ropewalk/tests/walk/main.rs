@@ -6,3 +6,4 @@ mod exact;
 mod parts;
 mod ropes;
 mod scenes;
+mod wave;

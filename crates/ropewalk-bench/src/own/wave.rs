@@ -1,0 +1,108 @@
+//! The fast path: the wide tree and the batch kernels.
+
+use super::ta_b::geometry;
+use crate::answer::{BenchHit, HitLists};
+use crate::harness::{Builder, Built, Clock, Engine, Family};
+use crate::scene::Mesh;
+use crate::workload::Question;
+use ropewalk::build::{BuildSettings, build};
+use ropewalk::cost::LeafCost;
+use ropewalk::kernel::BatchCaster;
+use ropewalk::wide::WideTree;
+use ropewalk::{Geometry, Ray};
+
+/// The wide tree, one batch call a workload, at the best SIMD level of the machine.
+pub struct Wave {
+    geometry: Geometry,
+    tree: WideTree,
+}
+
+/// The settings of the wide tree: leaves cost their blocks of eight, a step of three levels costs
+/// about as much as a block.
+pub fn settings(threads: usize) -> BuildSettings {
+    BuildSettings {
+        leaf_cost: LeafCost::Blocks { width: 8 },
+        traversal_cost: 0.3,
+        late_cutting: false,
+        threads,
+        ..BuildSettings::default()
+    }
+}
+
+impl Wave {
+    /// Builds a tree with `threads` threads.
+    ///
+    /// # Errors
+    /// What the builder or the compiler says.
+    pub fn build(mesh: &Mesh, threads: usize) -> anyhow::Result<Self> {
+        Self::over(geometry(mesh)?, threads)
+    }
+
+    fn over(geometry: Geometry, threads: usize) -> anyhow::Result<Self> {
+        let (tree, _) = build(&geometry, &settings(threads), &())?;
+        let tree = WideTree::compile(&tree, &geometry)?;
+        Ok(Wave { geometry, tree })
+    }
+
+    fn caster(&self) -> BatchCaster<'_> {
+        BatchCaster::new(&self.tree, &self.geometry).with_threads(1)
+    }
+}
+
+impl Engine for Wave {
+    fn name(&self) -> String {
+        "ropewalk-wave".into()
+    }
+
+    fn family(&self) -> Family {
+        Family::Own
+    }
+
+    fn level(&self) -> &str {
+        self.caster().level().name()
+    }
+
+    fn supports(&self, question: Question) -> bool {
+        question != Question::Build
+    }
+
+    fn closest(&self, rays: &[Ray], out: &mut [BenchHit]) {
+        let hits = self.caster().closest_hit(rays);
+        for ((out, t), prim) in out.iter_mut().zip(hits.t).zip(hits.prim_id) {
+            *out = BenchHit { t, prim };
+        }
+    }
+
+    fn occluded(&self, rays: &[Ray], out: &mut [bool]) {
+        self.caster().occluded_into(rays, out);
+    }
+
+    fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
+        let all = self.caster().first_hits(rays, limit);
+        let hits = all.t.into_iter().zip(all.prim_id).map(|(t, prim)| BenchHit { t, prim });
+        let offsets = all.offsets.into_iter().map(|o| o as u32).collect();
+        HitLists { offsets, hits: hits.collect() }
+    }
+}
+
+/// Times builds of the wide tree, the binary tree included.
+pub struct WaveBuilder<'a>(pub &'a Mesh);
+
+impl Builder for WaveBuilder<'_> {
+    fn name(&self) -> String {
+        "ropewalk-wide".into()
+    }
+
+    fn family(&self) -> Family {
+        Family::Own
+    }
+
+    fn build(&self, threads: usize) -> anyhow::Result<Built> {
+        let geometry = geometry(self.0)?;
+        let clock = Clock::start();
+        let built = Wave::over(geometry, threads)?;
+        let (cpu, wall_seconds) = clock.elapsed();
+        let seconds = if threads == 1 { cpu } else { wall_seconds };
+        Ok(Built { seconds, wall_seconds, bytes: Some(built.tree.bytes()) })
+    }
+}

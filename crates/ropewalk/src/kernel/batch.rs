@@ -1,0 +1,219 @@
+//! The batch calls: level and kernel picked once, work shared out over threads.
+
+#![allow(unsafe_code)]
+
+use super::level::Level;
+use super::query::{Any, BatchQuery, Closest, Every};
+use super::slot::Slot;
+use super::wave::{WAVE, wave};
+use crate::geometry::Geometry;
+use crate::ray::Ray;
+use crate::wide::WideTree;
+use rayon::prelude::*;
+
+/// Rays that one task of a parallel batch traces.
+const TASK: usize = 4096;
+
+/// The hits of a batch: one entry a ray.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BatchHit {
+    /// Parameter of the hit; infinite for a miss.
+    pub t: Vec<f32>,
+    /// Primitive of the hit; `u32::MAX` for a miss.
+    pub prim_id: Vec<u32>,
+}
+
+/// All hits of a batch in compressed rows: those of ray `i` are `offsets[i]..offsets[i + 1]`, in
+/// order of `(t, prim_id)`, each once.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AllHits {
+    /// Row starts; one more than there are rays.
+    pub offsets: Vec<usize>,
+    /// Parameters.
+    pub t: Vec<f32>,
+    /// Primitives.
+    pub prim_id: Vec<u32>,
+}
+
+/// Answers batches of rays over a wide tree.
+#[derive(Clone, Copy)]
+pub struct BatchCaster<'a> {
+    tree: &'a WideTree,
+    geometry: &'a Geometry,
+    level: Level,
+    threads: usize,
+}
+
+impl<'a> BatchCaster<'a> {
+    /// A caster at the best level of this machine, on all threads of the current rayon pool.
+    pub fn new(tree: &'a WideTree, geometry: &'a Geometry) -> Self {
+        BatchCaster { tree, geometry, level: Level::best(), threads: 0 }
+    }
+
+    /// The same with another level, or `None` if this machine lacks it.
+    pub fn with_level(self, level: Level) -> Option<Self> {
+        level.is_available().then_some(BatchCaster { level, ..self })
+    }
+
+    /// The same on the calling thread only (`1`) or on the current rayon pool (`0`).
+    pub fn with_threads(self, threads: usize) -> Self {
+        BatchCaster { threads, ..self }
+    }
+
+    /// The level in use.
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    /// The first hit of each ray.
+    pub fn closest_hit(&self, rays: &[Ray]) -> BatchHit {
+        let mut hit = BatchHit { t: vec![0.0; rays.len()], prim_id: vec![0; rays.len()] };
+        self.closest_hit_into(rays, &mut hit.t, &mut hit.prim_id);
+        hit
+    }
+
+    /// The first hit of each ray, into arrays of the same length as `rays`.
+    ///
+    /// # Panics
+    /// If the lengths differ.
+    pub fn closest_hit_into(&self, rays: &[Ray], t: &mut [f32], prim_id: &mut [u32]) {
+        assert!(t.len() == rays.len() && prim_id.len() == rays.len(), "one entry a ray");
+        if self.is_serial(rays) {
+            return self.run(rays, &mut Closest { t, prim: prim_id });
+        }
+        let chunks = t.par_chunks_mut(TASK).zip(prim_id.par_chunks_mut(TASK));
+        rays.par_chunks(TASK).zip(chunks).for_each(|(rays, (t, prim))| {
+            self.run(rays, &mut Closest { t, prim });
+        });
+    }
+
+    /// Whether each ray hits anything.
+    pub fn occluded(&self, rays: &[Ray]) -> Vec<bool> {
+        let mut hit = vec![false; rays.len()];
+        self.occluded_into(rays, &mut hit);
+        hit
+    }
+
+    /// Whether each ray hits anything, into an array of the same length as `rays`.
+    ///
+    /// # Panics
+    /// If the lengths differ.
+    pub fn occluded_into(&self, rays: &[Ray], hit: &mut [bool]) {
+        assert!(hit.len() == rays.len(), "one entry a ray");
+        if self.is_serial(rays) {
+            return self.run(rays, &mut Any { hit });
+        }
+        rays.par_chunks(TASK).zip(hit.par_chunks_mut(TASK)).for_each(|(rays, hit)| {
+            self.run(rays, &mut Any { hit });
+        });
+    }
+
+    /// All hits of each ray, in order, each once.
+    pub fn all_hits(&self, rays: &[Ray]) -> AllHits {
+        self.first_hits(rays, usize::MAX)
+    }
+
+    /// The first `k` hits of each ray, in order, each once.
+    pub fn first_hits(&self, rays: &[Ray], k: usize) -> AllHits {
+        let gather = |rays: &[Ray]| {
+            let mut every = Every {
+                first: k,
+                found: vec![Vec::new(); WAVE],
+                done: Vec::new(),
+                range: vec![(0, 0); rays.len()],
+            };
+            if k > 0 {
+                self.run(rays, &mut every);
+            }
+            every
+        };
+        let parts: Vec<Every> = if self.is_serial(rays) {
+            vec![gather(rays)]
+        } else {
+            rays.par_chunks(TASK).map(gather).collect()
+        };
+        let total = parts.iter().map(|p| p.done.len()).sum();
+        let mut all = AllHits {
+            offsets: Vec::with_capacity(rays.len() + 1),
+            t: Vec::with_capacity(total),
+            prim_id: Vec::with_capacity(total),
+        };
+        all.offsets.push(0);
+        for part in parts {
+            for (start, count) in part.range {
+                for &(t, prim) in &part.done[start..][..count as usize] {
+                    all.t.push(t);
+                    all.prim_id.push(prim);
+                }
+                all.offsets.push(all.t.len());
+            }
+        }
+        all
+    }
+
+    fn is_serial(&self, rays: &[Ray]) -> bool {
+        self.threads == 1 || rays.len() <= TASK
+    }
+
+    fn run<Q: BatchQuery>(&self, rays: &[Ray], query: &mut Q) {
+        if self.tree.has_shapes() {
+            self.run_level::<Q, true>(rays, query);
+        } else {
+            self.run_level::<Q, false>(rays, query);
+        }
+    }
+
+    fn run_level<Q: BatchQuery, const SHAPES: bool>(&self, rays: &[Ray], query: &mut Q) {
+        thread_local! {
+            static SLOTS: std::cell::RefCell<Vec<Slot>> = const { std::cell::RefCell::new(Vec::new()) };
+        }
+        let (tree, geometry) = (self.tree, self.geometry);
+        SLOTS.with_borrow_mut(|slots| {
+            if slots.is_empty() {
+                slots.resize_with(WAVE, Slot::new);
+            }
+            let slots = &mut slots[..rays.len().min(WAVE)];
+            match self.level {
+                // SAFETY: portable code.
+                Level::Scalar => unsafe {
+                    wave::<super::scalar::Scalar, Q, SHAPES>(tree, geometry, rays, slots, query);
+                },
+                // SAFETY: `with_level` and `Level::best` give only levels this machine has.
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx2 => unsafe {
+                    wave_avx2::<Q, SHAPES>(tree, geometry, rays, slots, query);
+                },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx512 => unsafe {
+                    wave_avx512::<Q, SHAPES>(tree, geometry, rays, slots, query);
+                },
+                #[cfg(not(target_arch = "x86_64"))]
+                _ => unreachable!("only available levels can be chosen"),
+            }
+        });
+    }
+}
+
+macro_rules! instantiate {
+    ($name:ident, $level:ty, $features:literal) => {
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = $features)]
+        fn $name<Q: BatchQuery, const SHAPES: bool>(
+            tree: &WideTree,
+            geometry: &Geometry,
+            rays: &[Ray],
+            slots: &mut [Slot],
+            query: &mut Q,
+        ) {
+            // SAFETY: this function enables the level's features.
+            unsafe { wave::<$level, Q, SHAPES>(tree, geometry, rays, slots, query) }
+        }
+    };
+}
+instantiate!(wave_avx2, super::avx2::Avx2, "avx2,fma,bmi1,bmi2,popcnt,lzcnt");
+instantiate!(
+    wave_avx512,
+    super::avx512::Avx512,
+    "avx2,fma,bmi1,bmi2,popcnt,lzcnt,avx512f,avx512vl,avx512bw,avx512dq"
+);

@@ -1,0 +1,73 @@
+//! The portable level: what the SIMD levels must equal bit for bit.
+
+#![allow(unsafe_code)]
+
+use super::level::Simd;
+use super::slot::{INTERVAL_SLACK, Slot};
+use crate::wide::{Block, ORDER, Treelet, WIDTH};
+
+/// Portable code.
+#[derive(Clone, Copy)]
+pub struct Scalar;
+
+impl Simd for Scalar {
+    #[inline(always)]
+    unsafe fn step(slot: &mut Slot, treelet: &Treelet, sp: usize) -> usize {
+        let mut t = [0.0f32; 7];
+        let mut signs = 0;
+        for (h, t) in t.iter_mut().enumerate() {
+            let a = treelet.axis(h);
+            *t = (treelet.plane[h] - slot.origin[a]) * slot.inv[a];
+            signs |= usize::from(slot.inv[a].is_sign_negative()) << h;
+        }
+        let (t_in, t_out) = (slot.enter[sp], slot.exit[sp]);
+        let mut sp = sp;
+        for (j, &packed) in ORDER.0[signs].iter().enumerate() {
+            let path = [0, packed as usize >> 3 & 7, packed as usize >> 6 & 7];
+            let (mut enter, mut exit) = (t_in, t_out);
+            for (level, h) in path.into_iter().enumerate() {
+                // A NaN (a ray in the plane) bounds neither side.
+                if j & (4 >> level) == 0 {
+                    enter = if t[h] > enter { t[h] } else { enter };
+                } else {
+                    exit = if t[h] < exit { t[h] } else { exit };
+                }
+            }
+            let code = treelet.child[packed as usize & 7];
+            if code != 0 && enter <= exit * (1.0 + INTERVAL_SLACK) {
+                slot.code[sp] = code;
+                slot.enter[sp] = enter;
+                slot.exit[sp] = exit;
+                sp += 1;
+            }
+        }
+        sp - 1
+    }
+
+    #[inline(always)]
+    unsafe fn candidates(slot: &Slot, block: &Block) -> u32 {
+        let k = slot.k.map(|a| a as usize);
+        let [sx, sy, sz] = slot.shear;
+        let mut mask = 0;
+        for lane in 0..WIDTH {
+            let [a, b, c] = std::array::from_fn(|i| {
+                let z = block.vertex[i][k[2]][lane] - slot.shear_origin[2];
+                let x = block.vertex[i][k[0]][lane] - slot.shear_origin[0];
+                let y = block.vertex[i][k[1]][lane] - slot.shear_origin[1];
+                [(-sx).mul_add(z, x), (-sy).mul_add(z, y), sz * z]
+            });
+            let edge = |p: [f32; 3], q: [f32; 3]| p[0].mul_add(q[1], -(p[1] * q[0]));
+            let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+            let size = |i: usize| a[i].abs().max(b[i].abs()).max(c[i].abs());
+            let slack = slot.edge_slack * (size(0) + size(1));
+            let outside = u.min(v).min(w) < -slack && u.max(v).max(w) > slack;
+            let (near, far) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
+            let in_range = near <= slot.limit_high && far >= slot.t_min_low;
+            mask |= u32::from(!outside && in_range) << lane;
+        }
+        mask
+    }
+
+    #[inline(always)]
+    unsafe fn prefetch(_address: *const u8) {}
+}

@@ -1,0 +1,60 @@
+//! Leaf blocks: eight primitives a block, triangles as structure of arrays.
+
+use crate::primitive::{Sides, Triangle};
+
+/// Lanes of a block.
+pub const WIDTH: usize = 8;
+
+/// Eight primitives.
+///
+/// ```text
+/// bytes   0..288  vertex[i][axis][lane]   coordinates of the triangles' vertices
+/// bytes 288..320  id[lane]                bits 29..0 primitive, bits 31..30 sides (see SIDES_*)
+/// ```
+/// A lane that holds no primitive has NaN vertices and [`NO_ID`]; a lane that holds a primitive of
+/// another kind has NaN vertices and that primitive's id. NaN vertices never test as hit.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug)]
+pub struct Block {
+    /// Vertex coordinates.
+    pub vertex: [[[f32; WIDTH]; 3]; 3],
+    /// Primitives and the sides on which they can be hit.
+    pub id: [u32; WIDTH],
+}
+
+const _: () = assert!(size_of::<Block>() == 320);
+
+/// Bits of the primitive in `Block::id`.
+pub const ID_MASK: u32 = (1 << 30) - 1;
+/// The id of a lane without a primitive.
+pub const NO_ID: u32 = ID_MASK;
+/// Both sides can be hit.
+pub const SIDES_BOTH: u32 = 0;
+/// Only the front can be hit.
+pub const SIDES_FRONT: u32 = 1 << 30;
+/// Only the back can be hit.
+pub const SIDES_BACK: u32 = 2 << 30;
+
+impl Block {
+    /// A block without primitives.
+    pub const EMPTY: Block = Block { vertex: [[[f32::NAN; WIDTH]; 3]; 3], id: [NO_ID; WIDTH] };
+
+    /// The triangle of a lane, the sides on which it can be hit, and its primitive.
+    #[inline(always)]
+    pub fn triangle(&self, lane: usize) -> (Triangle, Sides, u32) {
+        let vertices = self.vertex.map(|rows| rows.map(|row| row[lane]));
+        let sides = match self.id[lane] & !ID_MASK {
+            SIDES_FRONT => Sides::Front,
+            SIDES_BACK => Sides::Back,
+            _ => Sides::Both,
+        };
+        (Triangle { vertices }, sides, self.id[lane] & ID_MASK)
+    }
+
+    /// The lanes that hold primitives other than triangles.
+    pub fn shape_lanes(&self) -> u32 {
+        let holds =
+            |lane: usize| self.id[lane] & ID_MASK != NO_ID && self.vertex[0][0][lane].is_nan();
+        (0..WIDTH).map(|lane| u32::from(holds(lane)) << lane).sum()
+    }
+}

@@ -1,0 +1,100 @@
+//! The 64-byte treelet: three levels of the binary tree in one cache line.
+
+/// Up to seven cutting planes and up to eight children.
+///
+/// ```text
+/// bytes  0..28   plane[h]: split positions in heap order (0; 1, 2; 3, 4, 5, 6), +inf where absent
+/// bytes 28..32   axes: 4 bits a plane, plane h in bits 4h..4h+4; bits 28..32 are 0
+/// bytes 32..64   child[c]: c is the path from the root, first level in bit 2; upper side is 1
+///
+/// child code     0                 an empty cell
+///                bit 31 clear      index of a treelet (0 is a dummy, the root is 1)
+///                bit 31 set        leaf: bits 30..4 first block, bits 3..0 number of blocks;
+///                                  15 blocks mean that the true number stands in the overflow list
+/// ```
+/// A subtree of fewer levels fills the lowest child of its absent planes; +inf keeps rays on that
+/// side of them, and the other side is an empty cell.
+#[repr(C, align(64))]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Treelet {
+    /// Split positions in heap order.
+    pub plane: [f32; 7],
+    /// Axes, four bits each.
+    pub axes: u32,
+    /// Child codes.
+    pub child: [u32; 8],
+}
+
+const _: () = assert!(size_of::<Treelet>() == 64);
+
+/// Bit that marks a leaf.
+pub const LEAF: u32 = 1 << 31;
+/// Bits that hold the number of blocks.
+pub const COUNT_BITS: u32 = 4;
+/// The count that refers to the overflow list.
+pub const COUNT_OVERFLOW: u32 = (1 << COUNT_BITS) - 1;
+/// Largest number of blocks in a tree.
+pub const MAX_BLOCKS: usize = 1 << (31 - COUNT_BITS);
+
+impl Treelet {
+    /// A treelet without planes and children.
+    pub const EMPTY: Treelet = Treelet { plane: [f32::INFINITY; 7], axes: 0, child: [0; 8] };
+
+    /// The axis of plane `h`.
+    pub fn axis(&self, h: usize) -> usize {
+        (self.axes >> (4 * h) & 3) as usize
+    }
+}
+
+/// The code of a leaf of `count` blocks from `first` on.
+pub fn leaf_code(first: u32, count: u32) -> u32 {
+    LEAF | first << COUNT_BITS | count.min(COUNT_OVERFLOW)
+}
+
+/// First block and stored count of a leaf code.
+#[inline(always)]
+pub fn leaf_parts(code: u32) -> (u32, u32) {
+    ((code & !LEAF) >> COUNT_BITS, code & COUNT_OVERFLOW)
+}
+
+/// For each combination of direction signs on the seven planes: the children from far to near.
+///
+/// Entry `[signs][j]` packs, from bit 0, the child (3 bits), the plane crossed at level 1 (3 bits)
+/// and at level 2 (3 bits) on the way to it. `j = 7` is the nearest child, so that pushing the
+/// entries in order leaves the nearest on top of a stack.
+#[repr(C, align(64))]
+pub struct OrderTable(pub [[u16; 8]; 128]);
+
+impl OrderTable {
+    /// The table; bit `h` of the index is set if the direction component on plane `h`'s axis is
+    /// negative.
+    pub const fn new() -> Self {
+        let mut table = [[0u16; 8]; 128];
+        let mut signs = 0;
+        while signs < 128 {
+            let mut j = 0;
+            while j < 8 {
+                let rank = 7 - j; // 0 is nearest; bit 2: far side of the root plane
+                let side0 = (rank >> 2 & 1) ^ (signs & 1);
+                let h1 = 1 + side0;
+                let side1 = (rank >> 1 & 1) ^ (signs >> h1 & 1);
+                let h2 = 3 + 2 * side0 + side1;
+                let side2 = (rank & 1) ^ (signs >> h2 & 1);
+                let child = side0 * 4 + side1 * 2 + side2;
+                table[signs][j] = (child | h1 << 3 | h2 << 6) as u16;
+                j += 1;
+            }
+            signs += 1;
+        }
+        OrderTable(table)
+    }
+}
+
+impl Default for OrderTable {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The one table of the crate.
+pub static ORDER: OrderTable = OrderTable::new();

@@ -1,0 +1,100 @@
+//! Does a wide tree hold the cells of its binary tree?
+
+use super::{ID_MASK, LEAF, NO_ID, WIDTH, WideTree};
+use crate::tree::{BspTree, NodeKind};
+
+/// The first thing found wrong with a wide tree.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WideFault {
+    /// A child code points nowhere.
+    #[error("child {child} of treelet {treelet} points beyond the {what}")]
+    Range {
+        /// The treelet.
+        treelet: u32,
+        /// Its child.
+        child: usize,
+        /// The array that is too short.
+        what: &'static str,
+    },
+    /// The planes below a treelet are not those of the binary tree.
+    #[error("treelet {treelet} does not hold the planes of node {node}")]
+    Planes {
+        /// The treelet.
+        treelet: u32,
+        /// The binary node that it should stand for.
+        node: u32,
+    },
+    /// The primitives of a leaf are not those of the binary tree.
+    #[error("the blocks of code {code:#x} do not hold the primitives of leaf {node}")]
+    Leaf {
+        /// The leaf code.
+        code: u32,
+        /// The binary leaf.
+        node: u32,
+    },
+}
+
+impl WideTree {
+    /// Checks every treelet and leaf against the binary tree that it was compiled from.
+    ///
+    /// # Errors
+    /// The first [`WideFault`].
+    pub fn validate(&self, tree: &BspTree) -> Result<(), WideFault> {
+        let mut stack = vec![(self.root, BspTree::ROOT, 0, 0)];
+        while let Some((code, node, parent, child)) = stack.pop() {
+            if code & LEAF != 0 || code == 0 {
+                self.check_leaf(tree, code, node, parent, child)?;
+                continue;
+            }
+            let range = WideFault::Range { treelet: parent, child, what: "treelets" };
+            let treelet = self.treelets.get(code as usize).ok_or(range)?;
+            let mut roots = [None; 8];
+            let mut open = vec![(node, 0, 0, 0)];
+            while let Some((node, level, heap, path)) = open.pop() {
+                match tree.kind(node) {
+                    NodeKind::Inner { axis, split, left, right } if level < 3 => {
+                        if treelet.plane[heap] != split || treelet.axis(heap) != axis {
+                            return Err(WideFault::Planes { treelet: code, node });
+                        }
+                        open.push((left, level + 1, 2 * heap + 1, path));
+                        open.push((right, level + 1, 2 * heap + 2, path | 1 << (2 - level)));
+                    }
+                    _ => roots[path] = Some(node),
+                }
+            }
+            for (child, root) in roots.into_iter().enumerate() {
+                match root {
+                    Some(root) => stack.push((treelet.child[child], root, code, child)),
+                    None if treelet.child[child] == 0 => {}
+                    None => return Err(WideFault::Planes { treelet: code, node }),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_leaf(
+        &self,
+        tree: &BspTree,
+        code: u32,
+        node: u32,
+        treelet: u32,
+        child: usize,
+    ) -> Result<(), WideFault> {
+        let fault = WideFault::Leaf { code, node };
+        let NodeKind::Leaf { first, count } = tree.kind(node) else { return Err(fault) };
+        let expected = tree.leaf_refs(first, count);
+        if code == 0 {
+            return if expected.is_empty() { Ok(()) } else { Err(fault) };
+        }
+        let (first, count) = self.leaf_blocks(code);
+        let range = WideFault::Range { treelet, child, what: "blocks" };
+        let blocks = self.blocks.get(first as usize..).and_then(|b| b.get(..count as usize));
+        let blocks = blocks.ok_or(range)?;
+        let ids = blocks.iter().flat_map(|b| b.id).map(|id| id & ID_MASK);
+        let held: Vec<u32> = ids.filter(|&id| id != NO_ID).collect();
+        let full = count as usize == expected.len().div_ceil(WIDTH);
+        if held == expected && full { Ok(()) } else { Err(fault) }
+    }
+}

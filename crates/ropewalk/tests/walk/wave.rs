@@ -1,0 +1,126 @@
+//! The batch kernels at every level answer bit for bit as brute force does.
+
+use crate::bench::{Bench, coordinates};
+use crate::scenes;
+use ropewalk::kernel::{AllHits, BatchCaster, Level};
+use ropewalk::ray::PreparedRay;
+use ropewalk::traverse::{BruteForce, NoCounts, RayCaster};
+use ropewalk::tree::{BspTree, Node};
+use ropewalk::wide::WideTree;
+use ropewalk::{Geometry, Ray};
+use ropewalk_testkit::rays::{Draw, aligned_ray, generic_ray, grid_ray, invalid_rays};
+use ropewalk_testkit::trees::{TreeShape, random_tree};
+
+/// All hits of a ray, in order, each once.
+fn every_hit(geometry: &Geometry, ray: &Ray) -> Vec<(f32, u32)> {
+    let Some(prepared) = PreparedRay::new(ray) else { return Vec::new() };
+    let prims = 0..geometry.len() as u32;
+    let hit = |id| geometry.intersect(id, &prepared).map(|h| (h.t + 0.0, h.prim_id));
+    let mut hits: Vec<(f32, u32)> = prims.filter_map(hit).collect();
+    hits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    hits
+}
+
+fn check(geometry: &Geometry, tree: &BspTree, rays: &[Ray]) {
+    let wide = WideTree::compile(tree, geometry).unwrap();
+    assert_eq!(wide.validate(tree), Ok(()));
+    let oracle = BruteForce { geometry };
+    let closest: Vec<_> = rays.iter().map(|r| oracle.closest_hit(r, &mut NoCounts)).collect();
+    let every: Vec<_> = rays.iter().map(|r| every_hit(geometry, r)).collect();
+    for level in Level::ALL {
+        let Some(caster) = BatchCaster::new(&wide, geometry).with_level(level) else { continue };
+        let level = level.name();
+        let (hits, occluded) = (caster.closest_hit(rays), caster.occluded(rays));
+        let (all, first) = (caster.all_hits(rays), caster.first_hits(rays, 3));
+        for (i, ray) in rays.iter().enumerate() {
+            let expected = closest[i].map_or((f32::INFINITY, u32::MAX), |h| (h.t, h.prim_id));
+            assert_eq!((hits.t[i], hits.prim_id[i]), expected, "{level} closest, {ray:?}");
+            assert_eq!(occluded[i], closest[i].is_some(), "{level} occluded, {ray:?}");
+            let row = |of: &AllHits| {
+                let range = of.offsets[i]..of.offsets[i + 1];
+                let ids = of.prim_id[range.clone()].iter().copied();
+                of.t[range].iter().copied().zip(ids).collect::<Vec<_>>()
+            };
+            assert_eq!(row(&all), every[i], "{level} all hits, {ray:?}");
+            let three = &every[i][..every[i].len().min(3)];
+            assert_eq!(row(&first), three, "{level} first hits, {ray:?}");
+        }
+    }
+}
+
+fn rays_for(geometry: &Geometry, draw: &mut Draw, grid: Option<i32>) -> Vec<Ray> {
+    let tree = random_tree(draw, geometry, TreeShape::default()).unwrap();
+    let bench = Bench::new(geometry.clone().into(), tree.into());
+    let (values, bounds) = (coordinates(&bench), geometry.bounds());
+    let mut rays = invalid_rays();
+    for _ in 0..400 {
+        rays.push(generic_ray(draw, &bounds));
+        rays.push(aligned_ray(draw, &values));
+        if let Some(n) = grid {
+            rays.push(grid_ray(draw, n));
+            rays.push(grid_ray(draw, n).with_range(0.25, 2.0));
+        }
+    }
+    rays
+}
+
+fn each(seed: u64, grid: Option<i32>, scene: impl Fn(&mut Draw) -> Geometry) {
+    for round in 0..4 {
+        let mut draw = Draw::new(seed + round);
+        let geometry = scene(&mut draw);
+        let shape = TreeShape { max_depth: 6 + draw.below(16), ..TreeShape::default() };
+        let tree = random_tree(&mut draw, &geometry, shape).unwrap();
+        let rays = rays_for(&geometry, &mut draw, grid);
+        check(&geometry, &tree, &rays);
+    }
+}
+
+#[test]
+fn every_level_equals_brute_force() {
+    each(1, None, |d| scenes::soup(d, 300, 1.0));
+    each(2, None, |d| scenes::exponent_soup(d, 120, -6.0, 6.0));
+    each(3, None, |d| scenes::mixed(d, 150, false));
+    each(4, Some(6), |d| scenes::grid_soup(d, 150, 4));
+    each(5, Some(6), |d| scenes::grid_quads(d, 60, 4));
+    each(6, None, |d| scenes::flat(d, 50, 1));
+}
+
+#[test]
+fn leaves_of_more_blocks_than_a_code_can_count() {
+    let mut draw = Draw::new(8);
+    for count in [1, 7, 112, 113, 120, 121, 400] {
+        let geometry = scenes::soup(&mut draw, count, 1.0);
+        let refs: Vec<u32> = (0..count as u32).collect();
+        let nodes = vec![Node::leaf(0, count as u32)];
+        let tree = BspTree::from_nodes(geometry.bounds(), nodes, refs).unwrap();
+        let bounds = geometry.bounds();
+        let rays: Vec<_> = (0..100).map(|_| generic_ray(&mut draw, &bounds)).collect();
+        check(&geometry, &tree, &rays);
+    }
+}
+
+#[test]
+fn threads_do_not_change_answers() {
+    let mut draw = Draw::new(9);
+    let geometry = scenes::soup(&mut draw, 300, 1.0);
+    let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+    let wide = WideTree::compile(&tree, &geometry).unwrap();
+    let rays: Vec<_> = (0..20_000).map(|_| generic_ray(&mut draw, &geometry.bounds())).collect();
+    let all = BatchCaster::new(&wide, &geometry);
+    let one = all.with_threads(1);
+    assert_eq!(all.closest_hit(&rays), one.closest_hit(&rays));
+    assert_eq!(all.occluded(&rays), one.occluded(&rays));
+    assert_eq!(all.all_hits(&rays), one.all_hits(&rays));
+}
+
+#[test]
+fn an_empty_tree_is_missed() {
+    let geometry = Geometry::new();
+    let (tree, _) = ropewalk::build::build_default(&geometry).unwrap();
+    let wide = WideTree::compile(&tree, &geometry).unwrap();
+    let caster = BatchCaster::new(&wide, &geometry);
+    let rays = [Ray::new([0.0; 3], [1.0, 0.0, 0.0])];
+    assert_eq!(caster.occluded(&rays), [false]);
+    assert_eq!(caster.all_hits(&rays).offsets, [0, 0]);
+    assert!(caster.closest_hit(&[]).t.is_empty());
+}
