@@ -37,11 +37,15 @@ impl LogScale {
         (self.low..=self.high).contains(&value)
     }
 
-    /// Round values on the axis: 1, 2 and 5 of each decade, or the decades alone where the axis
-    /// spans more than two.
+    /// Round values on the axis: 1, 2 and 5 of each decade, more where the axis is short, and the
+    /// decades alone where it spans more than two.
     pub fn ticks(&self) -> Vec<f64> {
         let decades = self.low.log10().floor() as i32..=self.high.log10().ceil() as i32;
-        let steps: &[f64] = if self.high / self.low > 100.0 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+        let steps: &[f64] = match self.high / self.low {
+            span if span > 100.0 => &[1.0],
+            span if span > 6.0 => &[1.0, 2.0, 5.0],
+            _ => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
+        };
         let all = decades.flat_map(|d| steps.iter().map(move |s| s * 10f64.powi(d)));
         all.filter(|t| self.contains(*t)).collect()
     }
@@ -76,6 +80,7 @@ mod tests {
     #[test]
     fn ticks_are_round_and_on_the_axis() {
         assert_eq!(LogScale::new(0.9, 60.0, 0.0, 1.0).ticks(), [1.0, 2.0, 5.0, 10.0, 20.0, 50.0]);
+        assert_eq!(LogScale::new(14.0, 45.0, 0.0, 1.0).ticks(), [15.0, 20.0, 30.0, 40.0]);
         assert_eq!(LogScale::new(900.0, 2e6, 0.0, 1.0).ticks(), [1e3, 1e4, 1e5, 1e6]);
         let empty = LogScale::around([], 0.0, 1.0);
         assert!(empty.at(3.0).is_finite());
