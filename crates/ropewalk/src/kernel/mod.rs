@@ -11,6 +11,7 @@ mod query;
 mod scalar;
 mod slot;
 mod wave;
+mod x86;
 
 pub use batch::{AllHits, BatchCaster, BatchHit};
 pub use level::Level;

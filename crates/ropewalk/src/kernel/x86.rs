@@ -1,0 +1,129 @@
+//! What the x86-64 levels share: both compute in 256-bit registers with FMA and differ in how they
+//! mask and compress.
+
+#![cfg(target_arch = "x86_64")]
+#![allow(unsafe_code)]
+
+use super::slot::{INTERVAL_SLACK, Slot};
+use crate::wide::{Block, ORDER, Treelet};
+use std::arch::x86_64::*;
+
+/// The eight children of a treelet from far to near, and the ray's interval in each.
+pub struct Children {
+    /// Codes; 0 where a cell is empty.
+    pub code: __m256i,
+    /// Where the ray enters.
+    pub enter: __m256,
+    /// Where it leaves.
+    pub exit: __m256,
+    /// The same, widened: the cell is reached if `enter <= widened`.
+    pub widened: __m256,
+}
+
+/// The step without its last part: masking and compressing.
+///
+/// # Safety
+/// The machine must have AVX2 and FMA, and the caller must enable them; `sp` must be on the stack.
+#[inline(always)]
+pub unsafe fn children(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
+    debug_assert!(sp < super::slot::STACK);
+    // SAFETY: the caller vouches for the features; all loads lie in the aligned treelet, the table
+    // (index below 128) and the slot.
+    unsafe {
+        let origin = _mm256_broadcast_ps(&*slot.origin.as_ptr().cast::<__m128>());
+        let inv = _mm256_broadcast_ps(&*slot.inv.as_ptr().cast::<__m128>());
+        let planes = _mm256_load_ps(treelet.plane.as_ptr());
+        let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        let axes = _mm256_srlv_epi32(_mm256_set1_epi32(treelet.axes as i32), shifts);
+        let inv = _mm256_permutevar_ps(inv, axes);
+        let origin = _mm256_permutevar_ps(origin, axes);
+        let t = _mm256_mul_ps(_mm256_sub_ps(planes, origin), inv);
+
+        let signs = _mm256_movemask_ps(inv) as usize & 127;
+        let row = ORDER.0.as_ptr().add(signs).cast::<__m128i>();
+        let packed = _mm256_cvtepu16_epi32(_mm_load_si128(row));
+        let t0 = _mm256_broadcastss_ps(_mm256_castps256_ps128(t));
+        let t1 = _mm256_permutevar8x32_ps(t, _mm256_srli_epi32::<3>(packed));
+        let t2 = _mm256_permutevar8x32_ps(t, _mm256_srli_epi32::<6>(packed));
+        let children = _mm256_load_si256(treelet.child.as_ptr().cast());
+        let children = _mm256_permutevar8x32_epi32(children, packed);
+
+        // max and min return their second operand where the first is NaN: such a plane bounds
+        // neither side.
+        let enter = _mm256_set1_ps(*slot.enter.get_unchecked(sp));
+        let exit = _mm256_set1_ps(*slot.exit.get_unchecked(sp));
+        let enter = _mm256_blend_ps::<0x0F>(enter, _mm256_max_ps(t0, enter));
+        let exit = _mm256_blend_ps::<0xF0>(exit, _mm256_min_ps(t0, exit));
+        let enter = _mm256_blend_ps::<0x33>(enter, _mm256_max_ps(t1, enter));
+        let exit = _mm256_blend_ps::<0xCC>(exit, _mm256_min_ps(t1, exit));
+        let enter = _mm256_blend_ps::<0x55>(enter, _mm256_max_ps(t2, enter));
+        let exit = _mm256_blend_ps::<0xAA>(exit, _mm256_min_ps(t2, exit));
+
+        let widened = _mm256_mul_ps(exit, _mm256_set1_ps(1.0 + INTERVAL_SLACK));
+        Children { code: children, enter, exit, widened }
+    }
+}
+
+/// The eight lanes of a block as the filter sees them.
+pub struct Lanes {
+    /// Smallest edge function.
+    pub low: __m256,
+    /// Largest edge function.
+    pub high: __m256,
+    /// Error bound of the edge functions; the triangle is missed if `low < -slack` and
+    /// `high > slack`.
+    pub slack: __m256,
+    /// The negated bound.
+    pub minus_slack: __m256,
+    /// Parameter of the nearest vertex.
+    pub near: __m256,
+    /// Parameter of the farthest vertex.
+    pub far: __m256,
+    /// Largest parameter that matters, rounded up.
+    pub limit: __m256,
+    /// Smallest accepted parameter, rounded down.
+    pub t_min: __m256,
+}
+
+/// The filter without its comparisons.
+///
+/// # Safety
+/// As for [`children`].
+#[inline(always)]
+pub unsafe fn lanes(slot: &Slot, block: &Block) -> Lanes {
+    // SAFETY: the caller vouches for the features; all loads are of whole aligned rows.
+    unsafe {
+        let row = |i: usize, a: usize| {
+            let axis = *slot.k.get_unchecked(a) as usize;
+            _mm256_load_ps(block.vertex.get_unchecked(i).get_unchecked(axis).as_ptr())
+        };
+        let origin = slot.shear_origin.map(|x| _mm256_set1_ps(x));
+        let [sx, sy, sz] = slot.shear.map(|x| _mm256_set1_ps(x));
+        let vertex = |i: usize| {
+            let z = _mm256_sub_ps(row(i, 2), origin[2]);
+            let x = _mm256_sub_ps(row(i, 0), origin[0]);
+            let y = _mm256_sub_ps(row(i, 1), origin[1]);
+            [_mm256_fnmadd_ps(sx, z, x), _mm256_fnmadd_ps(sy, z, y), _mm256_mul_ps(sz, z)]
+        };
+        let (a, b, c) = (vertex(0), vertex(1), vertex(2));
+        let edge =
+            |p: [__m256; 3], q: [__m256; 3]| _mm256_fmsub_ps(p[0], q[1], _mm256_mul_ps(p[1], q[0]));
+        let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+        let low = _mm256_min_ps(_mm256_min_ps(u, v), w);
+        let high = _mm256_max_ps(_mm256_max_ps(u, v), w);
+
+        let sign = _mm256_set1_ps(-0.0);
+        let size = |i: usize| {
+            let [p, q, r] = [a[i], b[i], c[i]].map(|x| _mm256_andnot_ps(sign, x));
+            _mm256_max_ps(_mm256_max_ps(p, q), r)
+        };
+        let slack = _mm256_set1_ps(slot.edge_slack);
+        let slack = _mm256_mul_ps(slack, _mm256_add_ps(size(0), size(1)));
+        let minus_slack = _mm256_xor_ps(slack, sign);
+        let near = _mm256_min_ps(_mm256_min_ps(a[2], b[2]), c[2]);
+        let far = _mm256_max_ps(_mm256_max_ps(a[2], b[2]), c[2]);
+        let limit = _mm256_set1_ps(slot.limit_high);
+        let t_min = _mm256_set1_ps(slot.t_min_low);
+        Lanes { low, high, slack, minus_slack, near, far, limit, t_min }
+    }
+}
