@@ -20,13 +20,20 @@ pub struct Loaded {
 
 /// Reads a scene from a path or a built-in name.
 pub fn load(spec: &str) -> anyhow::Result<Loaded> {
+    load_as(spec, None)
+}
+
+/// The same with a facet policy; `None` is the rule of the databases.
+pub fn load_as(spec: &str, policy: Option<FacetPolicy>) -> anyhow::Result<Loaded> {
     let start = Instant::now();
     let scene = load_scene(spec, &NffLimits::default())?;
-    let geometry = scene.geometry(facet_policy(&scene)).with_context(|| spec.to_owned())?;
+    let policy = policy.unwrap_or_else(|| facet_policy(&scene));
+    let geometry = scene.geometry(policy).with_context(|| spec.to_owned())?;
     Ok(Loaded { scene, geometry: Arc::new(geometry), seconds: start.elapsed().as_secs_f64() })
 }
 
-/// The SPD rule: opaque surfaces are one-sided, except in the teapot.
+/// The SPD rule: opaque surfaces are one-sided, except in the teapot, built-in or in a file of that
+/// name (`teapot`, `teapot_12`).
 fn facet_policy(scene: &Scene) -> FacetPolicy {
     let stem = scene.name.split(['_', ':', '.']).find(|part| *part == "teapot");
     if stem.is_some() { FacetPolicy::TwoSided } else { FacetPolicy::OneSided }

@@ -83,6 +83,22 @@ fn spd_rules_shoot_corner_rays() {
 }
 
 #[test]
+fn two_sided_surfaces_are_hit_from_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let view = "v from 0 0 -5 at 0 0 0 up 0 1 0 angle 40 hither 0 resolution 8 8\n";
+    let polygon = "f 1 1 1 1 0 1 0 1\np 3\n-9 -9 0\n9 -9 0\n0 9 0\n"; // its front faces +z
+    std::fs::write(folder.path().join("a.nff"), format!("{view}{polygon}")).unwrap();
+    let hits = |extra: &[&str]| {
+        let args = [&["render", "a.nff", "-o", "a.png", "--json"], extra].concat();
+        let output = ropewalk(folder.path(), &args);
+        assert!(output.status.success(), "{}", stderr(&output));
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+        json["rays"]["primary_hits"].as_u64().unwrap()
+    };
+    assert_eq!((hits(&[]), hits(&["--two-sided"])), (0, 64));
+}
+
+#[test]
 fn scene_writes_what_stats_and_validate_read() {
     let folder = tempfile::tempdir().unwrap();
     let output = ropewalk(folder.path(), &["scene", "mount", "--size", "3", "-o", "m.nff"]);

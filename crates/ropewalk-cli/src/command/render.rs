@@ -7,6 +7,7 @@ use ropewalk::method::Method;
 use ropewalk_render::{
     AovKind, Monitor, Render, RenderSettings, check_image_path, render, write_image,
 };
+use ropewalk_scene::FacetPolicy;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -30,6 +31,10 @@ pub struct Args {
     /// The rules of the database: rays through the pixels' corners, four averaged
     #[arg(long)]
     spd_rules: bool,
+    /// Hit all surfaces from both sides; without this opaque ones are hit from their front only, as
+    /// the database's rules have it, except in a scene called teapot
+    #[arg(long)]
+    two_sided: bool,
     /// How to build and walk; an unknown name lists them all
     #[arg(long, default_value = Method::DEFAULT)]
     method: String,
@@ -68,7 +73,8 @@ struct Output {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let method = engine::method(&args.method)?;
     let aovs = aovs(&args.aov)?;
-    let loaded = engine::load(&args.scene)?;
+    let policy = args.two_sided.then_some(FacetPolicy::TwoSided);
+    let loaded = engine::load_as(&args.scene, policy)?;
     let picture = args
         .output
         .clone()
