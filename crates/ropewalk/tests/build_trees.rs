@@ -12,15 +12,7 @@ use ropewalk::{Geometry, Sides};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-const MEASURES: [Measure; 7] = [
-    Measure::SpatialMedian,
-    Measure::ObjectMedian,
-    Measure::MacDonaldBooth1990,
-    Measure::MacDonaldBooth,
-    Measure::HavranPrinted,
-    Measure::HavranPrintedCrossed,
-    Measure::Termination,
-];
+const MEASURES: [Measure; 7] = Measure::ALL;
 
 const TERMINATIONS: [Termination; 3] = [
     Termination::Fixed { leaf_size: 2, max_depth: Some(24) },

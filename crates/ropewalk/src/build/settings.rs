@@ -40,6 +40,19 @@ impl Measure {
     }
 }
 
+impl Measure {
+    /// All measures.
+    pub const ALL: [Measure; 7] = [
+        Measure::SpatialMedian,
+        Measure::ObjectMedian,
+        Measure::MacDonaldBooth1990,
+        Measure::MacDonaldBooth,
+        Measure::HavranPrinted,
+        Measure::HavranPrintedCrossed,
+        Measure::Termination,
+    ];
+}
+
 /// How the probabilities `p_L`, `p_R` that a ray ends in a child are estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

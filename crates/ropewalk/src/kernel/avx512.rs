@@ -51,7 +51,6 @@ impl Simd for Avx512 {
 
     #[inline(always)]
     unsafe fn prefetch(address: *const u8) {
-        // SAFETY: a prefetch of any address is harmless.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) }
+        x86::prefetch(address);
     }
 }

@@ -7,15 +7,7 @@ use ropewalk::build::{BuildSettings, Measure, Termination, build};
 use ropewalk_testkit::rays::{Draw, aligned_ray, generic_ray, grid_ray};
 use std::sync::Arc;
 
-const MEASURES: [Measure; 7] = [
-    Measure::SpatialMedian,
-    Measure::ObjectMedian,
-    Measure::MacDonaldBooth1990,
-    Measure::MacDonaldBooth,
-    Measure::HavranPrinted,
-    Measure::HavranPrintedCrossed,
-    Measure::Termination,
-];
+const MEASURES: [Measure; 7] = Measure::ALL;
 
 /// Settings that make deep and shallow trees, with clipping and without.
 fn settings(measure: Measure, draw: &mut Draw) -> BuildSettings {
