@@ -11,9 +11,12 @@ pub fn headline(experiment: &Experiment) -> String {
     let headline = &experiment.headline;
     let mut html = format!(
         "<h1>Surface-area BSP trees with rope trees: the 1997 experiment</h1>\n\
-         <p class=\"sub\">{} scenes of the Standard Procedural Databases at {} size, {}. \
+         <p class=\"sub\">{} of the Standard Procedural Databases at {} size, {}. \
          ropewalk {}, {}.</p>\n",
-        experiment.scenes.len(),
+        match experiment.scenes.len() {
+            1 => "One scene".to_owned(),
+            n => format!("{n} scenes"),
+        },
         experiment.size,
         escape(&experiment.machine.cpu),
         experiment.version,
