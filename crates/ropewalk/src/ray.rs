@@ -65,8 +65,38 @@ impl Hit {
     }
 }
 
-/// A ray made ready for the reference kernels: everything in `f64`, the shear of the watertight
-/// triangle test computed once (Woop, Benthin, Wald 2013, section 3).
+/// The frame in which triangles are tested: the ray becomes the third axis (Woop, Benthin, Wald
+/// 2013, section 3).
+#[derive(Clone, Copy, Debug)]
+pub struct Shear {
+    /// Axis order; the last is the axis of the largest direction component.
+    pub k: [usize; 3],
+    /// Origin of the ray, in the order x, y, z.
+    pub origin: [f64; 3],
+    /// Shear constants `(dx/dz, dy/dz, 1/dz)` in the order of `k`.
+    pub shear: [f64; 3],
+}
+
+impl Shear {
+    /// The frame of a valid ray.
+    #[inline(always)]
+    pub fn new(ray: &Ray) -> Self {
+        let d = ray.dir.map(f32::abs);
+        let y = usize::from(d[1] > d[0]);
+        let kz = if d[2] > d[y] { 2 } else { y };
+        // Swapped where the ray looks down, which keeps the winding.
+        let (next, last) = ([1, 2, 0][kz], [2, 0, 1][kz]);
+        let (kx, ky) = if ray.dir[kz] < 0.0 { (last, next) } else { (next, last) };
+        let [dx, dy, dz] = [kx, ky, kz].map(|a| f64::from(ray.dir[a]));
+        Shear {
+            k: [kx, ky, kz],
+            origin: ray.origin.map(f64::from),
+            shear: [dx / dz, dy / dz, 1.0 / dz],
+        }
+    }
+}
+
+/// A ray made ready for the reference kernels: everything in `f64`.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedRay {
     /// Origin.
@@ -79,10 +109,8 @@ pub struct PreparedRay {
     pub t_min: f32,
     /// Largest accepted parameter.
     pub t_max: f32,
-    /// Axis order of the shear: `k[2]` is the axis of the largest direction component.
-    pub k: [usize; 3],
-    /// Shear constants `(dx/dz, dy/dz, 1/dz)` in the order of `k`.
-    pub shear: [f64; 3],
+    /// The frame of the triangle test.
+    pub frame: Shear,
 }
 
 impl PreparedRay {
@@ -93,19 +121,13 @@ impl PreparedRay {
         }
         let origin = ray.origin.map(f64::from);
         let dir = ray.dir.map(f64::from);
-        let kz = (0..3).fold(0, |best, a| if dir[a].abs() > dir[best].abs() { a } else { best });
-        let (mut kx, mut ky) = ((kz + 1) % 3, (kz + 2) % 3);
-        if dir[kz] < 0.0 {
-            std::mem::swap(&mut kx, &mut ky); // keeps the winding
-        }
         Some(PreparedRay {
             origin,
             dir,
             inv: dir.map(|d| 1.0 / d),
             t_min: ray.t_min,
             t_max: ray.t_max,
-            k: [kx, ky, kz],
-            shear: [dir[kx] / dir[kz], dir[ky] / dir[kz], 1.0 / dir[kz]],
+            frame: Shear::new(ray),
         })
     }
 

@@ -3,10 +3,10 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::level::Simd;
+use super::level::{Found, Range, Simd};
 use super::slot::Slot;
-use super::x86::{self, Children, Lanes};
-use crate::wide::{Block, Treelet, WIDTH};
+use super::x86::{self, Children};
+use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
 use std::arch::x86_64::*;
 
 /// AVX2 and FMA.
@@ -61,18 +61,49 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn candidates(slot: &Slot, block: &Block) -> u32 {
-        // SAFETY: the caller vouches for the features.
+    unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
+        // SAFETY: the caller vouches for the features; the stores fill the rows of `range`.
         unsafe {
-            let Lanes { low, high, slack, minus_slack, near, far, limit, t_min } =
-                x86::lanes(slot, block);
-            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(low, minus_slack);
-            let outside = _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GT_OQ>(high, slack));
-            let in_range = _mm256_and_ps(
-                _mm256_cmp_ps::<_CMP_LE_OQ>(near, limit),
-                _mm256_cmp_ps::<_CMP_GE_OQ>(far, t_min),
+            let lanes = x86::lanes(slot, block);
+            let limit = _mm256_set1_ps(slot.limit);
+            let t_min = _mm256_set1_ps(slot.t_min);
+            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(lanes.low, lanes.minus_slack);
+            let outside =
+                _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GT_OQ>(lanes.high, lanes.slack));
+            let nearest = _mm256_sub_ps(lanes.near, lanes.blur);
+            let farthest = _mm256_add_ps(lanes.far, lanes.blur);
+            let meets = _mm256_and_ps(
+                _mm256_cmp_ps::<_CMP_LE_OQ>(nearest, limit),
+                _mm256_cmp_ps::<_CMP_GE_OQ>(farthest, t_min),
             );
-            _mm256_movemask_ps(_mm256_andnot_ps(outside, in_range)) as u32
+            let meets = _mm256_andnot_ps(outside, meets);
+            if _mm256_movemask_ps(meets) == 0 {
+                return Found::default();
+            }
+            let (low, high) = x86::parameters(&lanes);
+            _mm256_store_ps(range.low.as_mut_ptr(), low);
+            _mm256_store_ps(range.high.as_mut_ptr(), high);
+            let above = _mm256_cmp_ps::<_CMP_GT_OQ>(lanes.low, lanes.slack);
+            let under = _mm256_cmp_ps::<_CMP_LT_OQ>(lanes.high, lanes.minus_slack);
+            let inside = _mm256_and_ps(meets, _mm256_or_ps(above, under));
+            let reached = _mm256_and_ps(
+                _mm256_cmp_ps::<_CMP_LE_OQ>(low, limit),
+                _mm256_cmp_ps::<_CMP_GE_OQ>(high, t_min),
+            );
+            let reached = _mm256_and_ps(reached, inside);
+            let whole = _mm256_and_ps(
+                _mm256_cmp_ps::<_CMP_GE_OQ>(low, t_min),
+                _mm256_cmp_ps::<_CMP_LE_OQ>(high, limit),
+            );
+            let id = _mm256_load_si256(block.id.as_ptr().cast());
+            let sides = _mm256_andnot_si256(_mm256_set1_epi32(ID_MASK as i32), id);
+            let both = _mm256_cmpeq_epi32(sides, _mm256_setzero_si256());
+            let whole = _mm256_and_ps(whole, _mm256_castsi256_ps(both));
+            let clear = _mm256_and_ps(reached, whole);
+            let open =
+                _mm256_or_ps(_mm256_andnot_ps(inside, meets), _mm256_andnot_ps(clear, reached));
+            let mask = |v| _mm256_movemask_ps(v) as u32;
+            Found { clear: mask(clear), open: mask(open) }
         }
     }
 

@@ -3,10 +3,10 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::level::Simd;
+use super::level::{Found, Range, Simd};
 use super::slot::Slot;
-use super::x86::{self, Children, Lanes};
-use crate::wide::{Block, Treelet, WIDTH};
+use super::x86::{self, Children};
+use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
 use std::arch::x86_64::*;
 
 /// AVX-512 F, VL, BW, DQ.
@@ -36,16 +36,36 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn candidates(slot: &Slot, block: &Block) -> u32 {
-        // SAFETY: the caller vouches for the features.
+    unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
+        // SAFETY: the caller vouches for the features; the stores fill the rows of `range`.
         unsafe {
-            let Lanes { low, high, slack, minus_slack, near, far, limit, t_min } =
-                x86::lanes(slot, block);
-            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(low, minus_slack);
-            let outside = _mm256_mask_cmp_ps_mask::<_CMP_GT_OQ>(below, high, slack);
-            let in_range = _mm256_cmp_ps_mask::<_CMP_LE_OQ>(near, limit);
-            let in_range = _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(in_range, far, t_min);
-            u32::from(in_range & !outside)
+            let lanes = x86::lanes(slot, block);
+            let limit = _mm256_set1_ps(slot.limit);
+            let t_min = _mm256_set1_ps(slot.t_min);
+            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(lanes.low, lanes.minus_slack);
+            let outside = _mm256_mask_cmp_ps_mask::<_CMP_GT_OQ>(below, lanes.high, lanes.slack);
+            let nearest = _mm256_sub_ps(lanes.near, lanes.blur);
+            let farthest = _mm256_add_ps(lanes.far, lanes.blur);
+            let meets = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(!outside, nearest, limit);
+            let meets = _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(meets, farthest, t_min);
+            if meets == 0 {
+                return Found::default();
+            }
+            let (low, high) = x86::parameters(&lanes);
+            _mm256_store_ps(range.low.as_mut_ptr(), low);
+            _mm256_store_ps(range.high.as_mut_ptr(), high);
+            let above = _mm256_cmp_ps_mask::<_CMP_GT_OQ>(lanes.low, lanes.slack);
+            let under = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(lanes.high, lanes.minus_slack);
+            let inside = meets & (above | under);
+            let reached = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(inside, low, limit);
+            let reached = _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(reached, high, t_min);
+            let clear = _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(reached, low, t_min);
+            let clear = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(clear, high, limit);
+            let id = _mm256_load_si256(block.id.as_ptr().cast());
+            let sides = _mm256_set1_epi32(!ID_MASK as i32);
+            let clear = _mm256_mask_testn_epi32_mask(clear, id, sides);
+            let open = (meets & !inside) | (reached & !clear);
+            Found { clear: u32::from(clear), open: u32::from(open) }
         }
     }
 

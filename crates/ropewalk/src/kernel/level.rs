@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::slot::Slot;
-use crate::wide::{Block, Treelet};
+use crate::wide::{Block, Treelet, WIDTH};
 
 /// Instruction set of a kernel. All levels give bit-identical answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -55,6 +55,38 @@ impl Level {
     }
 }
 
+/// The lanes of a block that a ray may hit.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Found {
+    /// Lanes that it hits for sure, at a parameter in [`Range`], all of which lies between the
+    /// ray's `t_min` and limit.
+    pub clear: u32,
+    /// Lanes that must be decided exactly.
+    pub open: u32,
+}
+
+/// Bounds of the parameter in each clear lane of a block; without meaning in others.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Range {
+    /// Lower bounds.
+    pub low: [f32; WIDTH],
+    /// Upper bounds.
+    pub high: [f32; WIDTH],
+}
+
+/// Relative error of a parameter interpolated between the depths of a triangle's vertices, added to
+/// what the edge functions' errors contribute: three roundings in a depth, eight in the
+/// interpolation, and one more where the exact parameter is rounded.
+pub const DEPTH_SLACK: f32 = 16.0 * f32::EPSILON / 2.0;
+
+/// Error of an interpolated parameter in shares of the depth range times `slack / |det|`.
+///
+/// The weights `w` of the vertices are off by at most `slack` each. Depths taken from the middle of
+/// their range are at most half of it, and so is the parameter: `sum(dw z) - t sum(dw)` is at most
+/// `3 / 2 + 3 / 2` ranges times `slack`, and `det`, computed, divides it. 4 leaves room for roundings.
+pub const WEIGHT_SLACK: f32 = 4.0;
+
 /// The two hot steps, written for each level.
 ///
 /// # Safety
@@ -67,13 +99,14 @@ pub trait Simd: Copy {
     /// See the trait.
     unsafe fn step(slot: &mut Slot, treelet: &Treelet, sp: usize) -> usize;
 
-    /// The lanes of a block whose triangle the ray may hit: none that it hits is missing.
+    /// Tests the triangles of a block against the slot's ray, `t_min` and `limit`.
     ///
-    /// Rounding: see [`Slot::edge_slack`]. Lanes without a triangle (NaN) are never set.
+    /// `f32` with error bounds: a lane that is neither clear nor open is not hit, or hit beyond the
+    /// limit. Rounding: see [`Slot::edge_slack`]. Lanes without a triangle (NaN) are never set.
     ///
     /// # Safety
     /// See the trait.
-    unsafe fn candidates(slot: &Slot, block: &Block) -> u32;
+    unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found;
 
     /// Asks for a cache line.
     ///

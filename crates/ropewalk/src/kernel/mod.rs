@@ -6,6 +6,8 @@
 mod avx2;
 mod avx512;
 mod batch;
+mod exact;
+mod extreme;
 mod level;
 mod query;
 mod scalar;

@@ -2,9 +2,9 @@
 
 #![allow(unsafe_code)]
 
-use super::level::Simd;
-use super::slot::{INTERVAL_SLACK, Slot};
-use crate::wide::{Block, ORDER, Treelet, WIDTH};
+use super::level::{DEPTH_SLACK, Found, Range, Simd, WEIGHT_SLACK};
+use super::slot::{Slot, later};
+use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
 
 /// Portable code.
 #[derive(Clone, Copy)]
@@ -34,7 +34,7 @@ impl Simd for Scalar {
                 }
             }
             let code = treelet.child[packed as usize & 7];
-            if code != 0 && enter <= exit * (1.0 + INTERVAL_SLACK) {
+            if code != 0 && enter <= later(exit) {
                 slot.code[sp] = code;
                 slot.enter[sp] = enter;
                 slot.exit[sp] = exit;
@@ -45,27 +45,46 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    unsafe fn candidates(slot: &Slot, block: &Block) -> u32 {
+    unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         let k = slot.k.map(|a| a as usize);
         let [sx, sy, sz] = slot.shear;
-        let mut mask = 0;
+        let mut found = Found::default();
         for lane in 0..WIDTH {
             let [a, b, c] = std::array::from_fn(|i| {
                 let z = block.vertex[i][k[2]][lane] - slot.shear_origin[2];
                 let x = block.vertex[i][k[0]][lane] - slot.shear_origin[0];
                 let y = block.vertex[i][k[1]][lane] - slot.shear_origin[1];
-                [(-sx).mul_add(z, x), (-sy).mul_add(z, y), sz * z]
+                [x - sx * z, y - sy * z, sz * z]
             });
-            let edge = |p: [f32; 3], q: [f32; 3]| p[0].mul_add(q[1], -(p[1] * q[0]));
+            let edge = |p: [f32; 3], q: [f32; 3]| p[0] * q[1] - p[1] * q[0];
             let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+            let (smallest, largest) = (u.min(v).min(w), u.max(v).max(w));
             let size = |i: usize| a[i].abs().max(b[i].abs()).max(c[i].abs());
             let slack = slot.edge_slack * (size(0) + size(1));
-            let outside = u.min(v).min(w) < -slack && u.max(v).max(w) > slack;
+            let outside = smallest < -slack && largest > slack;
             let (near, far) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
-            let in_range = near <= slot.limit_high && far >= slot.t_min_low;
-            mask |= u32::from(!outside && in_range) << lane;
+            let blur = DEPTH_SLACK * near.abs().max(far.abs());
+            if outside || !(near - blur <= slot.limit && far + blur >= slot.t_min) {
+                continue;
+            }
+            let bit = 1 << lane;
+            if !(smallest > slack || largest < -slack) {
+                found.open |= bit;
+                continue;
+            }
+            let det = u + v + w;
+            let t = (u * a[2] + v * b[2] + w * c[2]) / det;
+            let blur = blur + (far - near) * WEIGHT_SLACK * (slack / det.abs());
+            let (low, high) = (t - blur, t + blur);
+            range.low[lane] = low;
+            range.high[lane] = high;
+            if low <= slot.limit && high >= slot.t_min {
+                let whole = low >= slot.t_min && high <= slot.limit;
+                let clear = whole && block.id[lane] & !ID_MASK == SIDES_BOTH;
+                *if clear { &mut found.clear } else { &mut found.open } |= bit;
+            }
         }
-        mask
+        found
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! One ray in flight.
 
 use crate::aabb::Aabb;
-use crate::ray::{PreparedRay, Ray};
+use crate::ray::Ray;
 use crate::wide::{LEAF, MAX_WIDE_DEPTH};
 
 /// Entries of a slot's stack: each treelet on a path replaces one entry by at most eight, and a
@@ -12,8 +12,35 @@ pub const STACK: usize = 7 * MAX_WIDE_DEPTH + 1 + 8;
 /// so two ends that meet in exact arithmetic differ by at most six.
 pub const INTERVAL_SLACK: f32 = 8.0 * f32::EPSILON / 2.0;
 
+/// A parameter made larger by [`INTERVAL_SLACK`].
+#[inline(always)]
+pub fn later(t: f32) -> f32 {
+    t + t.abs() * INTERVAL_SLACK
+}
+
+/// A parameter made smaller by [`INTERVAL_SLACK`].
+#[inline(always)]
+pub fn earlier(t: f32) -> f32 {
+    t - t.abs() * INTERVAL_SLACK
+}
+
 /// See [`Slot::edge_slack`].
 const EDGE_SLACK: f32 = 32.0 * f32::EPSILON / 2.0;
+
+/// Rays whose coordinates or direction leave this range would overflow or underflow in the filters'
+/// products; they are traced by the exact walk.
+const ORDINARY: std::ops::RangeInclusive<f32> = 1e-12..=1e12;
+
+/// What became of a ray that was to be put into a slot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Loaded {
+    /// It is under way.
+    Ready,
+    /// It cannot hit anything.
+    Misses,
+    /// Its numbers are too large or too small for the filters.
+    Extreme,
+}
 
 /// A ray in flight: constants of the steps and tests, the state of the query, the stack.
 ///
@@ -26,39 +53,39 @@ pub struct Slot {
     pub inv: [f32; 4],
     /// Origin in the shear's axis order.
     pub shear_origin: [f32; 3],
-    /// A little below the smallest accepted parameter.
-    pub t_min_low: f32,
-    /// Shear constants `(dx/dz, dy/dz, 1/dz)`.
-    pub shear: [f32; 3],
-    /// A little above the largest parameter that still matters.
-    pub limit_high: f32,
-    /// Largest parameter that still matters.
-    pub limit: f32,
     /// Error of an edge function per sum of the sheared coordinates' sizes.
     ///
     /// With `u = 2^-24` and `D` the largest offset of the scene's box from the origin, a sheared
     /// coordinate is off by at most `6 u D` and an edge function `p_x q_y - p_y q_x` by at most
     /// `20 u D (|x| + |y|)`, `|x|` and `|y|` being the largest sheared coordinates; `32 u D` is kept.
     pub edge_slack: f32,
+    /// Shear constants `(dx/dz, dy/dz, 1/dz)`.
+    pub shear: [f32; 3],
+    /// Smallest accepted parameter.
+    pub t_min: f32,
     /// Axis order of the shear.
     pub k: [u32; 3],
-    /// Primitive of the best hit.
-    pub best_id: u32,
     /// Index of the ray in the batch.
     pub ray: u32,
+    /// Upper bound of the parameters that still matter.
+    pub limit: f32,
+    /// Lower bound of the best hit's parameter; infinite without one.
+    pub best_low: f32,
+    /// Primitive of the best hit.
+    pub best_id: u32,
+    /// Where its triangle lies, or `u32::MAX` if `limit` is its exact parameter.
+    pub best_at: u32,
     /// Index of the top of the stack.
     pub sp: u32,
     /// True if a direction component is zero.
     pub may_lie_in_plane: bool,
-    /// The ray in double precision, made when the first candidate comes.
-    pub prepared: Option<PreparedRay>,
     /// Codes of the cells still to visit.
     pub code: [u32; STACK],
     /// Where the ray enters them.
     pub enter: [f32; STACK],
     /// Where it leaves them.
     pub exit: [f32; STACK],
-    _pad: [u32; 17],
+    _pad: [u32; 15],
 }
 
 const _: () = assert!(size_of::<Slot>() / 64 % 2 == 1);
@@ -70,41 +97,38 @@ impl Slot {
             origin: [0.0; 4],
             inv: [0.0; 4],
             shear_origin: [0.0; 3],
-            t_min_low: 0.0,
-            shear: [0.0; 3],
-            limit_high: 0.0,
-            limit: 0.0,
             edge_slack: 0.0,
+            shear: [0.0; 3],
+            t_min: 0.0,
             k: [0, 1, 2],
-            best_id: 0,
             ray: 0,
+            limit: 0.0,
+            best_low: 0.0,
+            best_id: 0,
+            best_at: 0,
             sp: 0,
             may_lie_in_plane: false,
-            prepared: None,
             code: [0; STACK],
             enter: [0.0; STACK],
             exit: [0.0; STACK],
-            _pad: [0; 17],
+            _pad: [0; 15],
         }
     }
 
-    /// Puts `ray` into the slot with `root` on its stack; false if it cannot hit anything in
-    /// `bounds`.
+    /// Puts `ray` into the slot with `root` on its stack, unless it cannot hit anything in `bounds`.
     #[inline(always)]
-    pub fn load(&mut self, ray: &Ray, index: u32, bounds: &Aabb, root: u32) -> bool {
+    pub fn load(&mut self, ray: &Ray, index: u32, bounds: &Aabb, root: u32) -> Loaded {
         if !ray.is_valid() {
-            return false;
+            return Loaded::Misses;
         }
         let (mut enter, mut exit) = (ray.t_min, ray.t_max);
         let mut inside = true;
-        let (mut kz, mut reach) = (0, 0.0f32);
-        self.may_lie_in_plane = ray.dir.contains(&0.0);
+        let mut reach = 0.0f32;
         for a in 0..3 {
             let (o, d) = (ray.origin[a], ray.dir[a]);
             let inv = 1.0 / d;
             self.origin[a] = o;
             self.inv[a] = inv;
-            kz = if d.abs() > ray.dir[kz].abs() { a } else { kz };
             let (lo, hi) = (bounds.min[a] - o, bounds.max[a] - o);
             reach = reach.max(lo.abs()).max(hi.abs());
             if d == 0.0 {
@@ -115,47 +139,52 @@ impl Slot {
                 exit = exit.min(near.max(far));
             }
         }
-        if !(inside && enter <= exit * (1.0 + INTERVAL_SLACK)) {
-            return false;
+        let size = ray.dir.map(f32::abs);
+        let y = usize::from(size[1] > size[0]);
+        let kz = if size[2] > size[y] { 2 } else { y };
+        self.may_lie_in_plane = self.inv[..3].iter().any(|x| x.is_infinite());
+        let vanishing = |a: usize| self.inv[a].is_infinite() && ray.dir[a] != 0.0;
+        let extreme = !ORDINARY.contains(&reach) || !ORDINARY.contains(&size[kz]);
+        if extreme || (self.may_lie_in_plane && (0..3).any(vanishing)) {
+            self.start(ray, index);
+            return Loaded::Extreme;
+        }
+        if !(inside && enter <= later(exit)) {
+            return Loaded::Misses;
         }
         let dz = ray.dir[kz];
-        let (mut kx, mut ky) = ((kz + 1) % 3, (kz + 2) % 3);
-        if dz < 0.0 {
-            std::mem::swap(&mut kx, &mut ky);
-        }
-        let inv_z = 1.0 / dz;
+        let (next, last) = ([1, 2, 0][kz], [2, 0, 1][kz]);
+        let (kx, ky) = if dz < 0.0 { (last, next) } else { (next, last) };
+        let inv_z = self.inv[kz];
         self.k = [kx as u32, ky as u32, kz as u32];
         self.shear_origin = [ray.origin[kx], ray.origin[ky], ray.origin[kz]];
         self.shear = [ray.dir[kx] * inv_z, ray.dir[ky] * inv_z, inv_z];
-        self.t_min_low = ray.t_min - ray.t_min.abs() * INTERVAL_SLACK;
         self.edge_slack = EDGE_SLACK * reach;
-        self.prepared = None;
-        self.set_limit(ray.t_max);
-        self.best_id = u32::MAX;
-        self.ray = index;
+        self.start(ray, index);
         self.code[0] = LEAF; // the sentinel: a leaf without blocks ends the ray
         self.code[1] = root;
         self.enter[1] = enter;
         self.exit[1] = exit;
         self.sp = 1;
-        true
+        Loaded::Ready
     }
 
-    /// Lowers the largest parameter that still matters.
     #[inline(always)]
-    pub fn set_limit(&mut self, limit: f32) {
-        self.limit = limit;
-        self.limit_high = limit + limit.abs() * INTERVAL_SLACK;
+    fn start(&mut self, ray: &Ray, index: u32) {
+        self.t_min = ray.t_min;
+        self.limit = ray.t_max;
+        self.best_low = f32::INFINITY;
+        self.best_id = u32::MAX;
+        self.best_at = u32::MAX;
+        self.ray = index;
     }
 
-    /// The ray in double precision, its range ending at the limit.
+    /// Sets the best hit to one whose exact parameter is known.
     #[inline(always)]
-    pub fn prepare(&mut self, rays: &[Ray]) -> &PreparedRay {
-        let ray = &rays[self.ray as usize];
-        let limit = self.limit;
-        // `load` has refused what cannot be prepared.
-        let prepared = self.prepared.get_or_insert_with(|| PreparedRay::new(ray).expect("loaded"));
-        prepared.t_max = limit;
-        prepared
+    pub fn set_best(&mut self, t: f32, prim_id: u32) {
+        self.limit = t;
+        self.best_low = t;
+        self.best_id = prim_id;
+        self.best_at = u32::MAX;
     }
 }

@@ -16,12 +16,13 @@
 
 #![allow(unsafe_code)]
 
-use super::level::Simd;
-use super::query::BatchQuery;
-use super::slot::{INTERVAL_SLACK, Slot};
+use super::exact::{Exact, place};
+use super::extreme;
+use super::level::{Found, Range, Simd};
+use super::query::{BatchQuery, ClearHit};
+use super::slot::{Loaded, Slot, earlier};
 use crate::geometry::Geometry;
-use crate::primitive::{Crossing, Primitive};
-use crate::ray::{Hit, Ray};
+use crate::ray::{PreparedRay, Ray};
 use crate::wide::{Block, COUNT_BITS, ID_MASK, LEAF, WIDTH, WideTree};
 
 /// Rays in flight on a core.
@@ -57,7 +58,7 @@ impl List {
 struct Wave<'a, Q> {
     tree: &'a WideTree,
     geometry: &'a Geometry,
-    rays: &'a [Ray],
+    exact: Exact<'a>,
     slots: &'a mut [Slot],
     query: &'a mut Q,
     next: usize,
@@ -81,7 +82,8 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, const SHAPES: bool>(
     let width = slots.len().min(WAVE);
     let slots = &mut slots[..width];
     let (stepping, waiting) = (List::EMPTY, List::EMPTY);
-    let mut wave = Wave { tree, geometry, rays, slots, query, next: 0, stepping, waiting };
+    let exact = Exact { blocks: tree.blocks(), rays };
+    let mut wave = Wave { tree, geometry, exact, slots, query, next: 0, stepping, waiting };
     for k in 0..width as u8 {
         // SAFETY: passed on to the caller.
         unsafe { wave.refill::<L>(k) };
@@ -149,39 +151,16 @@ impl<Q: BatchQuery> Wave<'_, Q> {
             let slot = &mut self.slots[k as usize];
             let sp = slot.sp as usize;
             let (first, count) = self.tree.leaf_blocks(slot.code[sp]);
-            for block in &self.tree.blocks()[first as usize..][..count as usize] {
+            for index in first as usize..(first + count) as usize {
                 // SAFETY: passed on to the caller.
-                let mut lanes = unsafe { L::candidates(slot, block) };
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize & (WIDTH - 1);
-                    lanes &= lanes - 1;
-                    // The vertices are at hand here; the geometry's copy would be a cache miss.
-                    let (triangle, sides, prim_id) = block.triangle(lane);
-                    if let Some(Crossing { t, u, v }) =
-                        triangle.intersect(slot.prepare(self.rays), sides)
-                    {
-                        self.query.take(k as usize, slot, &Hit { t, prim_id, u, v });
-                    }
-                }
-                if SHAPES {
-                    let mut lanes = block.shape_lanes();
-                    while lanes != 0 {
-                        let lane = lanes.trailing_zeros() as usize & (WIDTH - 1);
-                        lanes &= lanes - 1;
-                        let prim_id = block.id[lane] & ID_MASK;
-                        let ray = slot.prepare(self.rays);
-                        if let Some(hit) = self.geometry.intersect(prim_id, ray) {
-                            self.query.take(k as usize, slot, &hit);
-                        }
-                    }
-                }
+                unsafe { self.test_block::<L, SHAPES>(k, index) };
             }
+            let slot = &mut self.slots[k as usize];
             // Cells are popped in the order in which the ray enters them, so one that starts
             // behind the limit ends the ray; except that a ray in a cutting plane is in the cells
             // on both sides at once, and then only each cell by itself can be dropped.
             let mut below = sp.saturating_sub(1);
-            let shrink = 1.0 - INTERVAL_SLACK;
-            let behind = |cell: usize| slot.enter[cell] * shrink > slot.limit;
+            let behind = |cell: usize| earlier(slot.enter[cell]) > slot.limit;
             if slot.may_lie_in_plane {
                 while below > 0 && behind(below) {
                     below -= 1;
@@ -198,9 +177,58 @@ impl<Q: BatchQuery> Wave<'_, Q> {
         }
         for i in 0..done.len {
             let k = done.get(i);
-            self.query.finish(k as usize, &self.slots[k as usize]);
+            self.query.finish(k as usize, &mut self.slots[k as usize], &self.exact);
             // SAFETY: passed on to the caller.
             unsafe { self.refill::<L>(k) };
+        }
+    }
+
+    /// Tests the primitives of a block against the ray of slot `k`.
+    #[inline(always)]
+    unsafe fn test_block<L: Simd, const SHAPES: bool>(&mut self, k: u8, index: usize) {
+        let slot = &mut self.slots[k as usize];
+        let block = &self.exact.blocks[index];
+        let mut range = Range::default();
+        // SAFETY: passed on to the caller.
+        let Found { mut clear, mut open } = unsafe { L::test(slot, block, &mut range) };
+        while clear != 0 {
+            let lane = clear.trailing_zeros() as usize & (WIDTH - 1);
+            let hit = ClearHit {
+                prim_id: block.id[lane] & ID_MASK,
+                at: place(index, lane),
+                low: range.low[lane],
+                high: range.high[lane],
+            };
+            if !self.query.take_clear(k as usize, slot, &hit) {
+                open |= 1 << lane;
+            }
+            clear &= clear - 1;
+        }
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize & (WIDTH - 1);
+            if let Some(hit) = self.exact.hit(slot.ray, place(index, lane)) {
+                self.query.take(k as usize, slot, &hit, &self.exact);
+            }
+            open &= open - 1;
+        }
+        if SHAPES && block.shape_lanes() != 0 {
+            self.test_shapes(k, index);
+        }
+    }
+
+    /// Tests the primitives of a block that are no triangles.
+    fn test_shapes(&mut self, k: u8, index: usize) {
+        let slot = &mut self.slots[k as usize];
+        let block = &self.exact.blocks[index];
+        // `load` has refused what cannot be prepared.
+        let Some(ray) = PreparedRay::new(&self.exact.rays[slot.ray as usize]) else { return };
+        let mut lanes = block.shape_lanes();
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & (WIDTH - 1);
+            lanes &= lanes - 1;
+            if let Some(hit) = self.geometry.intersect(block.id[lane] & ID_MASK, &ray) {
+                self.query.take(k as usize, slot, &hit, &self.exact);
+            }
         }
     }
 
@@ -208,17 +236,31 @@ impl<Q: BatchQuery> Wave<'_, Q> {
     #[inline(always)]
     unsafe fn refill<L: Simd>(&mut self, k: u8) {
         let (bounds, root) = (self.tree.bounds(), self.tree.root());
-        while self.next < self.rays.len() {
+        while self.next < self.exact.rays.len() {
             let index = self.next;
             self.next += 1;
-            if root != 0
-                && self.slots[k as usize].load(&self.rays[index], index as u32, bounds, root)
-            {
-                // SAFETY: passed on to the caller.
-                unsafe { self.enlist::<L>(k, root) };
-                return;
+            if root == 0 {
+                self.query.miss(index);
+                continue;
             }
-            self.query.miss(index);
+            let ray = &self.exact.rays[index];
+            match self.slots[k as usize].load(ray, index as u32, bounds, root) {
+                Loaded::Ready => {
+                    // SAFETY: passed on to the caller.
+                    unsafe { self.enlist::<L>(k, root) };
+                    return;
+                }
+                Loaded::Misses => self.query.miss(index),
+                Loaded::Extreme => self.walk_extreme(k),
+            }
         }
+    }
+
+    /// Answers the ray of slot `k` without the filters.
+    #[cold]
+    fn walk_extreme(&mut self, k: u8) {
+        let slot = &mut self.slots[k as usize];
+        extreme::walk(self.tree, self.geometry, &self.exact, (k as usize, slot), self.query);
+        self.query.finish(k as usize, slot, &self.exact);
     }
 }

@@ -4,6 +4,7 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
+use super::level::{DEPTH_SLACK, WEIGHT_SLACK};
 use super::slot::{INTERVAL_SLACK, Slot};
 use crate::wide::{Block, ORDER, Treelet};
 use std::arch::x86_64::*;
@@ -59,13 +60,18 @@ pub unsafe fn children(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
         let enter = _mm256_blend_ps::<0x55>(enter, _mm256_max_ps(t2, enter));
         let exit = _mm256_blend_ps::<0xAA>(exit, _mm256_min_ps(t2, exit));
 
-        let widened = _mm256_mul_ps(exit, _mm256_set1_ps(1.0 + INTERVAL_SLACK));
+        let size = _mm256_andnot_ps(SIGN, exit);
+        let widened = _mm256_fmadd_ps(size, _mm256_set1_ps(INTERVAL_SLACK), exit);
         Children { code: children, enter, exit, widened }
     }
 }
 
-/// The eight lanes of a block as the filter sees them.
+/// The eight triangles of a block in the ray's frame.
 pub struct Lanes {
+    /// Edge functions.
+    pub edge: [__m256; 3],
+    /// Parameters of the vertices.
+    pub depth: [__m256; 3],
     /// Smallest edge function.
     pub low: __m256,
     /// Largest edge function.
@@ -79,13 +85,13 @@ pub struct Lanes {
     pub near: __m256,
     /// Parameter of the farthest vertex.
     pub far: __m256,
-    /// Largest parameter that matters, rounded up.
-    pub limit: __m256,
-    /// Smallest accepted parameter, rounded down.
-    pub t_min: __m256,
+    /// Error bound of the parameters.
+    pub blur: __m256,
 }
 
-/// The filter without its comparisons.
+const SIGN: __m256 = unsafe { std::mem::transmute::<[f32; 8], __m256>([-0.0; 8]) };
+
+/// The test without its comparisons.
 ///
 /// # Safety
 /// As for [`children`].
@@ -112,19 +118,41 @@ pub unsafe fn lanes(slot: &Slot, block: &Block) -> Lanes {
         let low = _mm256_min_ps(_mm256_min_ps(u, v), w);
         let high = _mm256_max_ps(_mm256_max_ps(u, v), w);
 
-        let sign = _mm256_set1_ps(-0.0);
         let size = |i: usize| {
-            let [p, q, r] = [a[i], b[i], c[i]].map(|x| _mm256_andnot_ps(sign, x));
+            let [p, q, r] = [a[i], b[i], c[i]].map(|x| _mm256_andnot_ps(SIGN, x));
             _mm256_max_ps(_mm256_max_ps(p, q), r)
         };
         let slack = _mm256_set1_ps(slot.edge_slack);
         let slack = _mm256_mul_ps(slack, _mm256_add_ps(size(0), size(1)));
-        let minus_slack = _mm256_xor_ps(slack, sign);
+        let minus_slack = _mm256_xor_ps(slack, SIGN);
         let near = _mm256_min_ps(_mm256_min_ps(a[2], b[2]), c[2]);
         let far = _mm256_max_ps(_mm256_max_ps(a[2], b[2]), c[2]);
-        let limit = _mm256_set1_ps(slot.limit_high);
-        let t_min = _mm256_set1_ps(slot.t_min_low);
-        Lanes { low, high, slack, minus_slack, near, far, limit, t_min }
+        let reach = _mm256_max_ps(_mm256_andnot_ps(SIGN, near), _mm256_andnot_ps(SIGN, far));
+        let blur = _mm256_mul_ps(reach, _mm256_set1_ps(DEPTH_SLACK));
+        let (edge, depth) = ([u, v, w], [a[2], b[2], c[2]]);
+        Lanes { edge, depth, low, high, slack, minus_slack, near, far, blur }
+    }
+}
+
+/// Bounds of the parameters at which the ray meets the triangles.
+///
+/// # Safety
+/// As for [`children`].
+#[inline(always)]
+pub unsafe fn parameters(lanes: &Lanes) -> (__m256, __m256) {
+    // SAFETY: the caller vouches for the features.
+    unsafe {
+        let [u, v, w] = lanes.edge;
+        let [a, b, c] = lanes.depth;
+        let det = _mm256_add_ps(_mm256_add_ps(u, v), w);
+        let sum = _mm256_fmadd_ps(u, a, _mm256_fmadd_ps(v, b, _mm256_mul_ps(w, c)));
+        let inv = _mm256_div_ps(_mm256_set1_ps(1.0), det);
+        let t = _mm256_mul_ps(sum, inv);
+        let range = _mm256_sub_ps(lanes.far, lanes.near);
+        let share = _mm256_mul_ps(lanes.slack, _mm256_andnot_ps(SIGN, inv));
+        let share = _mm256_mul_ps(share, _mm256_set1_ps(WEIGHT_SLACK));
+        let blur = _mm256_fmadd_ps(range, share, lanes.blur);
+        (_mm256_sub_ps(t, blur), _mm256_add_ps(t, blur))
     }
 }
 

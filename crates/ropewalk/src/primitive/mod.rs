@@ -14,7 +14,7 @@ pub use cone::Cone;
 pub use patch::Patch;
 pub use polygon::{EDGE_TOLERANCE, Polygon};
 pub use sphere::Sphere;
-pub use triangle::Triangle;
+pub use triangle::{Meeting, Triangle};
 
 use crate::aabb::Aabb;
 use crate::ray::PreparedRay;

@@ -3,7 +3,7 @@
 use super::planar::{CLIP_SLACK, Extent, SmallLoop, length, loop_ramps, overlap};
 use super::{AreaRamp, Crossing, Primitive, ShapeError, Sides, SurfaceNormals};
 use crate::aabb::Aabb;
-use crate::ray::PreparedRay;
+use crate::ray::{PreparedRay, Shear};
 
 /// A triangle by its three vertices; counter-clockwise as seen from the front.
 ///
@@ -58,12 +58,62 @@ impl Triangle {
         n.map(|x| x / len)
     }
 
+    /// Where the line of a ray meets the triangle on one of `sides`, whatever the ray's range. The
+    /// triangle must not be degenerate.
+    #[inline(always)]
+    pub fn meet(&self, frame: &Shear, sides: Sides) -> Option<Meeting> {
+        let [kx, ky, kz] = frame.k;
+        let [sx, sy, sz] = frame.shear;
+        let [a, b, c] = self.vertices.map(|p| {
+            let dz = f64::from(p[kz]) - frame.origin[kz];
+            let dx = f64::from(p[kx]) - frame.origin[kx];
+            let dy = f64::from(p[ky]) - frame.origin[ky];
+            [dx - sx * dz, dy - sy * dz, dz]
+        });
+        // Edge functions: no fused operations, or the two triangles of an edge would differ.
+        let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
+        if of_both_signs(u, v, w) {
+            return None;
+        }
+        // A candidate. A small sum may be rounding (a needle, or a triangle seen edge-on), and a
+        // zero may be: both are settled without rounding the products.
+        let product = |p: [f64; 3], q: [f64; 3]| (p[0] * q[1]).abs() + (p[1] * q[0]).abs();
+        let products = product(c, b) + product(a, c) + product(b, a);
+        if u == 0.0 || v == 0.0 || w == 0.0 || (u + v + w).abs() < EDGE_FILTER * products {
+            (u, v, w) = (edge_exactly(c, b), edge_exactly(a, c), edge_exactly(b, a));
+            if of_both_signs(u, v, w) {
+                return None;
+            }
+        }
+        // All of one sign: the sum vanishes only for a triangle seen exactly edge-on.
+        let det = u + v + w;
+        if det == 0.0 || !sides.accepts(-det) {
+            return None;
+        }
+        let depth = (u * a[2] + v * b[2] + w * c[2]) / det;
+        let nearest = a[2].min(b[2]).min(c[2]);
+        let farthest = a[2].max(b[2]).max(c[2]);
+        let t = sz * depth.clamp(nearest, farthest);
+        Some(Meeting { t, u: (v / det) as f32, v: (w / det) as f32 })
+    }
+
     /// The clipped triangle, in a cell widened by `slack`.
     #[inline]
     fn clipped(&self, bounds: &Aabb, cell: &Aabb, slack: [f64; 3]) -> Option<SmallLoop> {
         let corners = self.vertices.map(|p| p.map(f64::from));
         SmallLoop::new(corners).clip(bounds, &Extent::widened(cell, slack))
     }
+}
+
+/// A point common to the line of a ray and a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Meeting {
+    /// Parameter along the ray, not yet rounded.
+    pub t: f64,
+    /// Barycentric weight of vertex 1.
+    pub u: f32,
+    /// Barycentric weight of vertex 2.
+    pub v: f32,
 }
 
 /// Where the sum of the edge functions is below this share of their products, these are computed
@@ -161,45 +211,10 @@ impl Primitive for Triangle {
 
     #[inline]
     fn intersect(&self, ray: &PreparedRay, sides: Sides) -> Option<Crossing> {
-        let [kx, ky, kz] = ray.k;
-        let [sx, sy, sz] = ray.shear;
-        let [a, b, c] = self.vertices.map(|p| {
-            let dz = f64::from(p[kz]) - ray.origin[kz];
-            let dx = f64::from(p[kx]) - ray.origin[kx];
-            let dy = f64::from(p[ky]) - ray.origin[ky];
-            [dx - sx * dz, dy - sy * dz, dz]
-        });
-        // Edge functions: no fused operations, or the two triangles of an edge would differ.
-        let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
-        if of_both_signs(u, v, w) {
-            return None;
-        }
-        // A candidate. A small sum may be rounding (a needle, or a triangle seen edge-on), and a
-        // zero may be: both are settled without rounding the products.
-        let product = |p: [f64; 3], q: [f64; 3]| (p[0] * q[1]).abs() + (p[1] * q[0]).abs();
-        let products = product(c, b) + product(a, c) + product(b, a);
-        if u == 0.0 || v == 0.0 || w == 0.0 || (u + v + w).abs() < EDGE_FILTER * products {
-            (u, v, w) = (edge_exactly(c, b), edge_exactly(a, c), edge_exactly(b, a));
-            if of_both_signs(u, v, w) {
-                return None;
-            }
-        }
-        // All of one sign: the sum vanishes only for a triangle seen exactly edge-on.
-        let det = u + v + w;
-        if det == 0.0 || !sides.accepts(-det) {
-            return None;
-        }
-        let depth = (u * a[2] + v * b[2] + w * c[2]) / det;
-        let nearest = a[2].min(b[2]).min(c[2]);
-        let farthest = a[2].max(b[2]).max(c[2]);
-        let t = sz * depth.clamp(nearest, farthest);
+        let Meeting { t, u, v } = self.meet(&ray.frame, sides)?;
         let crossing = Crossing::in_range(ray, t)?;
         // Points on one line can enclose a ray only by rounding.
-        (!self.is_degenerate()).then(|| Crossing {
-            u: (v / det) as f32,
-            v: (w / det) as f32,
-            ..crossing
-        })
+        (!self.is_degenerate()).then_some(Crossing { u, v, ..crossing })
     }
 
     fn normals(&self, _point: [f64; 3], _crossing: Crossing) -> SurfaceNormals {

@@ -5,7 +5,7 @@ use super::{
     WIDTH, WideTree, leaf_code,
 };
 use crate::geometry::Geometry;
-use crate::primitive::{Shape, Sides};
+use crate::primitive::{Primitive, Shape, Sides};
 use crate::tree::{BspTree, NodeKind};
 
 impl WideTree {
@@ -117,6 +117,8 @@ impl Compiler<'_> {
                 };
                 block.id[lane] = prim | sides;
                 match self.geometry.shape(prim) {
+                    // A degenerate triangle keeps its id and NaN vertices: it is never hit.
+                    Shape::Triangle(triangle) if triangle.is_degenerate() => {}
                     Shape::Triangle(triangle) => {
                         for (rows, vertex) in block.vertex.iter_mut().zip(triangle.vertices) {
                             for (row, x) in rows.iter_mut().zip(vertex) {

@@ -3,11 +3,12 @@
 use crate::bench::{Bench, coordinates};
 use crate::scenes;
 use ropewalk::kernel::{AllHits, BatchCaster, Level};
+use ropewalk::primitive::Triangle;
 use ropewalk::ray::PreparedRay;
 use ropewalk::traverse::{BruteForce, NoCounts, RayCaster};
 use ropewalk::tree::{BspTree, Node};
 use ropewalk::wide::WideTree;
-use ropewalk::{Geometry, Ray};
+use ropewalk::{Geometry, Ray, Shape};
 use ropewalk_testkit::rays::{Draw, aligned_ray, generic_ray, grid_ray, invalid_rays};
 use ropewalk_testkit::trees::{TreeShape, random_tree};
 
@@ -83,6 +84,56 @@ fn every_level_equals_brute_force() {
     each(4, Some(6), |d| scenes::grid_soup(d, 150, 4));
     each(5, Some(6), |d| scenes::grid_quads(d, 60, 4));
     each(6, None, |d| scenes::flat(d, 50, 1));
+}
+
+/// Coordinates and directions whose products leave the range of `f32`.
+#[test]
+fn extreme_numbers_change_nothing() {
+    each(20, None, |d| scenes::exponent_soup(d, 60, -19.0, 19.0));
+    for exponent in [-110, -75, -50, 50, 66, 70, 75, 110] {
+        each(21, None, |d| {
+            let (soup, scale) = (scenes::soup(d, 100, 1.0), 2f32.powi(exponent));
+            let mut scaled = Geometry::new();
+            for id in 0..soup.len() as u32 {
+                let Shape::Triangle(triangle) = soup.shape(id) else { unreachable!() };
+                let vertices = triangle.vertices.map(|p| p.map(|x| x * scale));
+                scaled.push(Triangle { vertices }, soup.sides(id)).unwrap();
+            }
+            scaled
+        });
+    }
+    let mut draw = Draw::new(30);
+    let geometry = scenes::soup(&mut draw, 100, 1.0);
+    let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+    let rays: Vec<_> = (0..2000)
+        .map(|_| {
+            let mut ray = generic_ray(&mut draw, &geometry.bounds());
+            let scale = draw.uniform(-37.0, 37.0);
+            let axis = draw.below(3);
+            ray.dir = ray.dir.map(|d| (f64::from(d) * 10f64.powf(scale)) as f32);
+            ray.dir[axis] *= if draw.chance(0.3) { 1e-38 } else { 1.0 };
+            ray
+        })
+        .collect();
+    check(&geometry, &tree, &rays);
+}
+
+#[test]
+fn ranges_may_be_negative() {
+    let mut draw = Draw::new(31);
+    let geometry = scenes::soup(&mut draw, 200, 1.0);
+    let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+    let oracle = BruteForce { geometry: &geometry };
+    let mut rays = Vec::new();
+    for _ in 0..1500 {
+        let ray = generic_ray(&mut draw, &geometry.bounds()).with_range(f32::NEG_INFINITY, 0.0);
+        // Ranges that begin or end exactly at a hit.
+        let hit = oracle.closest_hit(&ray, &mut NoCounts);
+        rays.extend(hit.map(|h| ray.with_range(h.t, 0.0)));
+        rays.extend(hit.map(|h| ray.with_range(f32::NEG_INFINITY, h.t)));
+        rays.extend([ray, ray.with_range(-2.0, -1.0), ray.with_range(-1.0, 1.0)]);
+    }
+    check(&geometry, &tree, &rays);
 }
 
 #[test]

@@ -1,0 +1,38 @@
+//! What the filters leave open: decided in `f64`, as the reference walks do.
+
+use crate::ray::{Hit, Ray, Shear};
+use crate::wide::{Block, WIDTH};
+
+/// A triangle where it lies: its block times eight plus its lane.
+pub type At = u32;
+
+/// The place of a lane.
+#[inline(always)]
+pub fn place(block: usize, lane: usize) -> At {
+    (block * WIDTH + lane) as u32
+}
+
+/// The blocks and rays of a batch, for exact tests.
+#[derive(Clone, Copy)]
+pub struct Exact<'a> {
+    /// All leaf blocks.
+    pub blocks: &'a [Block],
+    /// All rays.
+    pub rays: &'a [Ray],
+}
+
+impl Exact<'_> {
+    /// The hit of a ray on a triangle, if it lies in the ray's range.
+    ///
+    /// The block has just been tested, so it is at hand where the geometry's own copy would not be.
+    #[inline(always)]
+    pub fn hit(&self, ray: u32, at: At) -> Option<Hit> {
+        let (block, lane) = (&self.blocks[at as usize / WIDTH], at as usize % WIDTH);
+        let ray = &self.rays[ray as usize];
+        let (triangle, sides, prim_id) = block.triangle(lane);
+        let met = triangle.meet(&Shear::new(ray), sides)?;
+        let t = met.t as f32;
+        let accepted = t.is_finite() && ray.t_min <= t && t <= ray.t_max;
+        accepted.then_some(Hit { t, prim_id, u: met.u, v: met.v })
+    }
+}
