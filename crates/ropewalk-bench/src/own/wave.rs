@@ -44,7 +44,8 @@ impl Wave {
         Ok(Wave { geometry, tree })
     }
 
-    fn caster(&self) -> BatchCaster<'_> {
+    /// The caster on one thread.
+    pub fn caster(&self) -> BatchCaster<'_> {
         BatchCaster::new(&self.tree, &self.geometry).with_threads(1)
     }
 }

@@ -2,6 +2,7 @@
 
 #![allow(unsafe_code)]
 
+use super::events::{BatchEvents, Events, NoEvents};
 use super::level::Level;
 use super::query::{Any, BatchQuery, Closest, Every};
 use super::slot::Slot;
@@ -151,19 +152,43 @@ impl<'a> BatchCaster<'a> {
         all
     }
 
+    /// What the batch of [`BatchCaster::closest_hit`] does, counted, on one thread.
+    pub fn closest_hit_events(&self, rays: &[Ray]) -> BatchEvents {
+        let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
+        let mut events = BatchEvents::default();
+        self.run_counted(rays, &mut Closest { t: &mut t, prim: &mut prim }, &mut events);
+        events
+    }
+
+    /// What the batch of [`BatchCaster::occluded`] does, counted, on one thread.
+    pub fn occluded_events(&self, rays: &[Ray]) -> BatchEvents {
+        let (mut hit, mut events) = (vec![false; rays.len()], BatchEvents::default());
+        self.run_counted(rays, &mut Any { hit: &mut hit }, &mut events);
+        events
+    }
+
     fn is_serial(&self, rays: &[Ray]) -> bool {
         self.threads == 1 || rays.len() <= TASK
     }
 
     fn run<Q: BatchQuery>(&self, rays: &[Ray], query: &mut Q) {
+        self.run_counted(rays, query, &mut NoEvents);
+    }
+
+    fn run_counted<Q: BatchQuery, E: Events>(&self, rays: &[Ray], query: &mut Q, events: &mut E) {
         if self.tree.has_shapes() {
-            self.run_level::<Q, true>(rays, query);
+            self.run_level::<Q, E, true>(rays, query, events);
         } else {
-            self.run_level::<Q, false>(rays, query);
+            self.run_level::<Q, E, false>(rays, query, events);
         }
     }
 
-    fn run_level<Q: BatchQuery, const SHAPES: bool>(&self, rays: &[Ray], query: &mut Q) {
+    fn run_level<Q: BatchQuery, E: Events, const SHAPES: bool>(
+        &self,
+        rays: &[Ray],
+        query: &mut Q,
+        events: &mut E,
+    ) {
         thread_local! {
             static SLOTS: std::cell::RefCell<Vec<Slot>> = const { std::cell::RefCell::new(Vec::new()) };
         }
@@ -176,17 +201,19 @@ impl<'a> BatchCaster<'a> {
             match self.level {
                 // SAFETY: portable code.
                 Level::Scalar => unsafe {
-                    wave::<super::scalar::Scalar, Q, SHAPES>(tree, geometry, rays, slots, query);
+                    wave::<super::scalar::Scalar, Q, E, SHAPES>(
+                        tree, geometry, rays, slots, query, events,
+                    );
                 },
                 // SAFETY: `with_level` and `Level::best` give only levels this machine has.
                 #[cfg(target_arch = "x86_64")]
                 Level::Avx2 => unsafe {
-                    wave_avx2::<Q, SHAPES>(tree, geometry, rays, slots, query);
+                    wave_avx2::<Q, E, SHAPES>(tree, geometry, rays, slots, query, events);
                 },
                 // SAFETY: as above.
                 #[cfg(target_arch = "x86_64")]
                 Level::Avx512 => unsafe {
-                    wave_avx512::<Q, SHAPES>(tree, geometry, rays, slots, query);
+                    wave_avx512::<Q, E, SHAPES>(tree, geometry, rays, slots, query, events);
                 },
                 #[cfg(not(target_arch = "x86_64"))]
                 _ => unreachable!("only available levels can be chosen"),
@@ -199,15 +226,16 @@ macro_rules! instantiate {
     ($name:ident, $level:ty, $features:literal) => {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
-        fn $name<Q: BatchQuery, const SHAPES: bool>(
+        fn $name<Q: BatchQuery, E: Events, const SHAPES: bool>(
             tree: &WideTree,
             geometry: &Geometry,
             rays: &[Ray],
             slots: &mut [Slot],
             query: &mut Q,
+            events: &mut E,
         ) {
             // SAFETY: this function enables the level's features.
-            unsafe { wave::<$level, Q, SHAPES>(tree, geometry, rays, slots, query) }
+            unsafe { wave::<$level, Q, E, SHAPES>(tree, geometry, rays, slots, query, events) }
         }
     };
 }

@@ -1,22 +1,22 @@
 //! What the filters leave open: decided in `f64`, as the reference walks do.
 
 use crate::ray::{Hit, Ray, Shear};
-use crate::wide::{Block, WIDTH};
+use crate::wide::{Lines, WIDTH};
 
-/// A triangle where it lies: its block times eight plus its lane.
+/// A triangle where it lies: the line of its block times eight plus its lane.
 pub type At = u32;
 
-/// The place of a lane.
+/// The place of a lane of the block at `line`.
 #[inline(always)]
-pub fn place(block: usize, lane: usize) -> At {
-    (block * WIDTH + lane) as u32
+pub fn place(line: usize, lane: usize) -> At {
+    (line * WIDTH + lane) as u32
 }
 
-/// The blocks and rays of a batch, for exact tests.
+/// The triangles and rays of a batch, for exact tests.
 #[derive(Clone, Copy)]
 pub struct Exact<'a> {
-    /// All leaf blocks.
-    pub blocks: &'a [Block],
+    /// The tree's memory.
+    pub lines: &'a Lines,
     /// All rays.
     pub rays: &'a [Ray],
 }
@@ -27,7 +27,7 @@ impl Exact<'_> {
     /// The block has just been tested, so it is at hand where the geometry's own copy would not be.
     #[inline(always)]
     pub fn hit(&self, ray: u32, at: At) -> Option<Hit> {
-        let (block, lane) = (&self.blocks[at as usize / WIDTH], at as usize % WIDTH);
+        let (block, lane) = (self.lines.block(at as usize / WIDTH), at as usize % WIDTH);
         let ray = &self.rays[ray as usize];
         let (triangle, sides, prim_id) = block.triangle(lane);
         let met = triangle.meet(&Shear::new(ray), sides)?;

@@ -5,7 +5,7 @@ use super::query::BatchQuery;
 use super::slot::Slot;
 use crate::geometry::Geometry;
 use crate::ray::{PreparedRay, Ray};
-use crate::wide::{ID_MASK, LEAF, Treelet, WIDTH, WideTree};
+use crate::wide::{ID_MASK, LEAF, Treelet, WIDTH, WideTree, code_line};
 
 /// Relative slack of a parameter computed in `f64`: a difference, a quotient, a little more.
 const SLACK: f64 = 16.0 * f64::EPSILON;
@@ -34,12 +34,11 @@ pub fn walk<Q: BatchQuery>(
             continue;
         }
         if code & LEAF == 0 {
-            push_children(&mut stack, &tree.treelets()[code as usize], ray, interval);
+            push_children(&mut stack, tree.lines().treelet(code_line(code)), ray, interval);
             continue;
         }
-        let (first, count) = tree.leaf_blocks(code);
-        for index in first as usize..(first + count) as usize {
-            let block = &tree.blocks()[index];
+        for line in tree.block_lines(code) {
+            let block = tree.lines().block(line);
             for lane in 0..WIDTH {
                 let shape = block.shape_lanes() >> lane & 1 == 1;
                 let hit = if shape {
@@ -47,7 +46,7 @@ pub fn walk<Q: BatchQuery>(
                 } else if block.vertex[0][0][lane].is_nan() {
                     None
                 } else {
-                    exact.hit(slot.ray, place(index, lane))
+                    exact.hit(slot.ray, place(line, lane))
                 };
                 if let Some(hit) = hit {
                     query.take(k, slot, &hit, exact);

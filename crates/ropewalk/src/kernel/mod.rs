@@ -6,6 +6,7 @@
 mod avx2;
 mod avx512;
 mod batch;
+mod events;
 mod exact;
 mod extreme;
 mod level;
@@ -16,4 +17,5 @@ mod wave;
 mod x86;
 
 pub use batch::{AllHits, BatchCaster, BatchHit};
+pub use events::BatchEvents;
 pub use level::Level;

@@ -16,51 +16,59 @@
 
 #![allow(unsafe_code)]
 
+use super::events::Events;
 use super::exact::{Exact, place};
 use super::extreme;
 use super::level::{Found, Range, Simd};
 use super::query::{BatchQuery, ClearHit};
-use super::slot::{Loaded, Slot, earlier};
+use super::slot::{Loaded, STACK, Slot, earlier};
 use crate::geometry::Geometry;
 use crate::ray::{PreparedRay, Ray};
-use crate::wide::{Block, COUNT_BITS, ID_MASK, LEAF, WIDTH, WideTree};
+use crate::wide::{
+    BLOCK_LINES, Block, ID_MASK, LEAF, LINE, WIDTH, WideTree, code_line, code_offset,
+};
 
 /// Rays in flight on a core.
 pub const WAVE: usize = 24;
 
-/// Bytes of a cache line.
-const LINE: usize = 64;
-
-/// A list of slot numbers; 32 entries, so that a masked index needs no bounds check.
-#[derive(Clone, Copy)]
+/// Slots and the codes of the cells that their rays visit next; 32 entries, so that a masked index
+/// needs no bounds check.
 struct List {
     slot: [u8; 32],
+    code: [u32; 32],
     len: usize,
 }
 
 impl List {
-    const EMPTY: List = List { slot: [0; 32], len: 0 };
+    const EMPTY: List = List { slot: [0; 32], code: [0; 32], len: 0 };
 
-    /// Writes `k` behind the list and keeps it if `keep` is 1: no branch.
     #[inline(always)]
-    fn push_if(&mut self, k: u8, keep: usize) {
-        self.slot[self.len & 31] = k;
-        self.len += keep;
+    fn push(&mut self, k: u8, code: u32) {
+        self.set(self.len, k, code);
+        self.len += 1;
+    }
+
+    /// Writes an entry without keeping it: no branch.
+    #[inline(always)]
+    fn set(&mut self, i: usize, k: u8, code: u32) {
+        self.slot[i & 31] = k;
+        self.code[i & 31] = code;
     }
 
     #[inline(always)]
-    fn get(&self, i: usize) -> u8 {
-        self.slot[i & 31]
+    fn get(&self, i: usize) -> (u8, u32) {
+        (self.slot[i & 31], self.code[i & 31])
     }
 }
 
 /// A batch on its way.
-struct Wave<'a, Q> {
+struct Wave<'a, Q, E> {
     tree: &'a WideTree,
     geometry: &'a Geometry,
     exact: Exact<'a>,
     slots: &'a mut [Slot],
     query: &'a mut Q,
+    events: &'a mut E,
     next: usize,
     stepping: List,
     waiting: List,
@@ -72,18 +80,19 @@ struct Wave<'a, Q> {
 /// The machine must have the features of `L`, and the caller must enable them: everything here is
 /// inlined into it.
 #[inline(always)]
-pub unsafe fn wave<L: Simd, Q: BatchQuery, const SHAPES: bool>(
+pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
     tree: &WideTree,
     geometry: &Geometry,
     rays: &[Ray],
     slots: &mut [Slot],
     query: &mut Q,
+    events: &mut E,
 ) {
     let width = slots.len().min(WAVE);
     let slots = &mut slots[..width];
     let (stepping, waiting) = (List::EMPTY, List::EMPTY);
-    let exact = Exact { blocks: tree.blocks(), rays };
-    let mut wave = Wave { tree, geometry, exact, slots, query, next: 0, stepping, waiting };
+    let exact = Exact { lines: tree.lines(), rays };
+    let mut wave = Wave { tree, geometry, exact, slots, query, events, next: 0, stepping, waiting };
     for k in 0..width as u8 {
         // SAFETY: passed on to the caller.
         unsafe { wave.refill::<L>(k) };
@@ -99,103 +108,161 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, const SHAPES: bool>(
     }
 }
 
-impl<Q: BatchQuery> Wave<'_, Q> {
+impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
     /// Every stepping ray replaces its treelet by the children it reaches.
+    ///
+    /// Two loops: what a step leaves on the stack is looked at only after all have stepped, so that
+    /// no step waits for the stores of the one before.
     #[inline(always)]
     unsafe fn step_phase<L: Simd>(&mut self) {
-        let n = std::mem::take(&mut self.stepping.len);
+        let slots = self.slots.as_mut_ptr();
+        let lines = self.tree.lines().as_ptr();
+        let n = self.stepping.len;
         for i in 0..n {
-            let k = self.stepping.get(i);
-            let slot = &mut self.slots[k as usize];
-            let sp = slot.sp as usize;
-            let treelet = &self.tree.treelets()[slot.code[sp] as usize];
+            let (k, code) = self.stepping.get(i);
+            self.events.step();
+            // SAFETY: lists hold numbers of slots and codes of the tree, whose links are valid.
+            unsafe {
+                let slot = &mut *slots.add(k as usize);
+                let sp = slot.sp as usize;
+                let treelet = &*lines.add(code_offset(code)).cast();
+                slot.sp = L::step(slot, treelet, sp) as u32;
+            }
+        }
+        let (mut stepping, before) = (0, self.waiting.len);
+        let mut waiting = before;
+        for i in 0..n {
+            let (k, _) = self.stepping.get(i);
+            // SAFETY: as above; the stack pointer stays on the stack.
+            let code = unsafe {
+                let slot = &*slots.add(k as usize);
+                *slot.code.get_unchecked(slot.sp as usize)
+            };
+            let leaf = (code >> 31) as usize;
             // SAFETY: passed on to the caller.
-            let sp = unsafe { L::step(slot, treelet, sp) };
-            slot.sp = sp as u32;
-            let code = slot.code[sp];
-            // SAFETY: passed on to the caller.
-            unsafe { self.enlist::<L>(k, code) };
+            unsafe { L::prefetch(self.address(code)) };
+            self.waiting.set(waiting, k, code);
+            self.stepping.set(stepping, k, code);
+            waiting += leaf;
+            stepping += 1 - leaf;
+        }
+        self.stepping.len = stepping;
+        self.waiting.len = waiting;
+        // SAFETY: passed on to the caller.
+        unsafe { self.prefetch_blocks::<L>(before) };
+    }
+
+    /// Where a cell lies in memory.
+    #[inline(always)]
+    fn address(&self, code: u32) -> *const u8 {
+        self.tree.lines().as_ptr().wrapping_add(code_offset(code))
+    }
+
+    /// Asks for the first blocks of the waiting rays from entry `from` on.
+    #[inline(always)]
+    unsafe fn prefetch_blocks<L: Simd>(&self, from: usize) {
+        for i in from..self.waiting.len {
+            let block = self.address(self.waiting.get(i).1);
+            for line in 1..BLOCK_LINES {
+                // SAFETY: passed on to the caller.
+                unsafe { L::prefetch(block.wrapping_add(line * LINE)) };
+            }
         }
     }
 
-    /// Puts slot `k`, whose next cell is `code`, on the list of its kind and prefetches the cell.
+    /// Puts slot `k`, whose next cell is `code`, on the list of its kind.
     #[inline(always)]
     unsafe fn enlist<L: Simd>(&mut self, k: u8, code: u32) {
-        let leaf = (code >> 31) as usize;
-        let first = ((code & !LEAF) >> COUNT_BITS) as usize;
-        let block = self.tree.blocks().as_ptr().wrapping_add(first).cast::<u8>();
-        let treelet = self.tree.treelets().as_ptr().wrapping_add(code as usize).cast::<u8>();
-        let address = std::hint::select_unpredictable(leaf == 1, block, treelet);
         // SAFETY: passed on to the caller.
-        unsafe { L::prefetch(address) };
-        self.waiting.push_if(k, leaf);
-        self.stepping.push_if(k, 1 - leaf);
+        unsafe { L::prefetch(self.address(code)) };
+        if code & LEAF != 0 {
+            self.waiting.push(k, code);
+        } else {
+            self.stepping.push(k, code);
+        }
     }
 
     /// Every waiting ray tests its leaf and goes on, or makes room for the next ray.
     #[inline(always)]
     unsafe fn leaf_phase<L: Simd, const SHAPES: bool>(&mut self) {
-        let visit = std::mem::replace(&mut self.waiting, List::EMPTY);
-        for i in 0..visit.len {
-            let slot = &self.slots[visit.get(i) as usize];
-            let (first, _) = self.tree.leaf_blocks(slot.code[slot.sp as usize]);
-            let block = self.tree.blocks().as_ptr().wrapping_add(first as usize).cast::<u8>();
-            for line in 1..size_of::<Block>() / LINE {
+        let n = std::mem::take(&mut self.waiting.len);
+        for i in 0..n {
+            let (k, code) = self.waiting.get(i);
+            let count = self.tree.block_count(code);
+            if count > 0 {
+                self.events.leaf();
+            }
+            let mut line = code_line(code);
+            for _ in 0..count {
                 // SAFETY: passed on to the caller.
-                unsafe { L::prefetch(block.wrapping_add(line * LINE)) };
+                unsafe { self.test_block::<L, SHAPES>(k, line) };
+                line += BLOCK_LINES;
             }
         }
-        let mut done = List::EMPTY;
-        for i in 0..visit.len {
-            let k = visit.get(i);
-            let slot = &mut self.slots[k as usize];
-            let sp = slot.sp as usize;
-            let (first, count) = self.tree.leaf_blocks(slot.code[sp]);
-            for index in first as usize..(first + count) as usize {
-                // SAFETY: passed on to the caller.
-                unsafe { self.test_block::<L, SHAPES>(k, index) };
-            }
-            let slot = &mut self.slots[k as usize];
-            // Cells are popped in the order in which the ray enters them, so one that starts
-            // behind the limit ends the ray; except that a ray in a cutting plane is in the cells
-            // on both sides at once, and then only each cell by itself can be dropped.
-            let mut below = sp.saturating_sub(1);
-            let behind = |cell: usize| earlier(slot.enter[cell]) > slot.limit;
-            if slot.may_lie_in_plane {
-                while below > 0 && behind(below) {
-                    below -= 1;
-                }
-            }
-            let ended = below == 0 || behind(below) || (Q::ANY && slot.best_id != u32::MAX);
-            slot.sp = below as u32;
-            let code = slot.code[below];
-            done.push_if(k, usize::from(ended));
-            if !ended {
-                // SAFETY: passed on to the caller.
-                unsafe { self.enlist::<L>(k, code) };
-            }
+        let (mut waiting, mut stepping) = (0, self.stepping.len);
+        let (mut done, mut finished) = ([0u8; 32], 0);
+        for i in 0..n {
+            let (k, _) = self.waiting.get(i);
+            // SAFETY: lists hold numbers of slots; the stack pointer stays on the stack.
+            let (ended, code) = unsafe {
+                let slot = &mut *self.slots.as_mut_ptr().add(k as usize);
+                let ended = Self::pop(slot);
+                (ended, *slot.code.get_unchecked(slot.sp as usize))
+            };
+            let leaf = (code >> 31) as usize;
+            // SAFETY: passed on to the caller.
+            unsafe { L::prefetch(self.address(code)) };
+            done[finished & 31] = k;
+            self.waiting.set(waiting, k, code);
+            self.stepping.set(stepping, k, code);
+            finished += usize::from(ended);
+            waiting += leaf & usize::from(!ended);
+            stepping += (1 - leaf) & usize::from(!ended);
         }
-        for i in 0..done.len {
-            let k = done.get(i);
+        self.stepping.len = stepping;
+        self.waiting.len = waiting;
+        for k in done.into_iter().take(finished) {
             self.query.finish(k as usize, &mut self.slots[k as usize], &self.exact);
             // SAFETY: passed on to the caller.
             unsafe { self.refill::<L>(k) };
         }
+        // SAFETY: passed on to the caller.
+        unsafe { self.prefetch_blocks::<L>(0) };
+    }
+
+    /// Takes the cell just visited off the stack; true if nothing is left that matters.
+    ///
+    /// Cells are popped in the order in which the ray enters them, so one that starts behind the
+    /// limit ends the ray; except that a ray in a cutting plane is in the cells on both sides at
+    /// once, and then only each cell by itself can be dropped.
+    #[inline(always)]
+    fn pop(slot: &mut Slot) -> bool {
+        let mut below = (slot.sp as usize).saturating_sub(1).min(STACK - 1);
+        if slot.may_lie_in_plane {
+            while below > 0 && earlier(slot.enter[below]) > slot.limit {
+                below -= 1;
+            }
+        }
+        slot.sp = below as u32;
+        let behind = earlier(slot.enter[below]) > slot.limit;
+        (below == 0) | behind | (Q::ANY & (slot.best_id != u32::MAX))
     }
 
     /// Tests the primitives of a block against the ray of slot `k`.
     #[inline(always)]
-    unsafe fn test_block<L: Simd, const SHAPES: bool>(&mut self, k: u8, index: usize) {
+    unsafe fn test_block<L: Simd, const SHAPES: bool>(&mut self, k: u8, line: usize) {
         let slot = &mut self.slots[k as usize];
-        let block = &self.exact.blocks[index];
+        // SAFETY: the codes of a tree lead to its blocks.
+        let block = unsafe { &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>() };
         let mut range = Range::default();
         // SAFETY: passed on to the caller.
         let Found { mut clear, mut open } = unsafe { L::test(slot, block, &mut range) };
+        self.events.block(clear, open);
         while clear != 0 {
             let lane = clear.trailing_zeros() as usize & (WIDTH - 1);
             let hit = ClearHit {
                 prim_id: block.id[lane] & ID_MASK,
-                at: place(index, lane),
+                at: place(line, lane),
                 low: range.low[lane],
                 high: range.high[lane],
             };
@@ -206,20 +273,20 @@ impl<Q: BatchQuery> Wave<'_, Q> {
         }
         while open != 0 {
             let lane = open.trailing_zeros() as usize & (WIDTH - 1);
-            if let Some(hit) = self.exact.hit(slot.ray, place(index, lane)) {
+            if let Some(hit) = self.exact.hit(slot.ray, place(line, lane)) {
                 self.query.take(k as usize, slot, &hit, &self.exact);
             }
             open &= open - 1;
         }
         if SHAPES && block.shape_lanes() != 0 {
-            self.test_shapes(k, index);
+            self.test_shapes(k, line);
         }
     }
 
     /// Tests the primitives of a block that are no triangles.
-    fn test_shapes(&mut self, k: u8, index: usize) {
+    fn test_shapes(&mut self, k: u8, line: usize) {
         let slot = &mut self.slots[k as usize];
-        let block = &self.exact.blocks[index];
+        let block = self.tree.lines().block(line);
         // `load` has refused what cannot be prepared.
         let Some(ray) = PreparedRay::new(&self.exact.rays[slot.ray as usize]) else { return };
         let mut lanes = block.shape_lanes();
@@ -246,6 +313,7 @@ impl<Q: BatchQuery> Wave<'_, Q> {
             let ray = &self.exact.rays[index];
             match self.slots[k as usize].load(ray, index as u32, bounds, root) {
                 Loaded::Ready => {
+                    self.events.ray();
                     // SAFETY: passed on to the caller.
                     unsafe { self.enlist::<L>(k, root) };
                     return;

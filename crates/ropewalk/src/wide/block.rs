@@ -14,7 +14,7 @@ pub const WIDTH: usize = 8;
 /// A lane that holds no primitive has NaN vertices and [`NO_ID`]; a lane that holds a primitive of
 /// another kind has NaN vertices and that primitive's id. NaN vertices never test as hit.
 #[repr(C, align(64))]
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Block {
     /// Vertex coordinates.
     pub vertex: [[[f32; WIDTH]; 3]; 3],

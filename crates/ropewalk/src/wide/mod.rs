@@ -6,27 +6,31 @@
 
 mod block;
 mod compile;
+mod lines;
 mod treelet;
 mod validate;
 
 pub use block::{Block, ID_MASK, NO_ID, SIDES_BACK, SIDES_BOTH, SIDES_FRONT, WIDTH};
+pub use lines::{BLOCK_LINES, LINE, Lines};
 pub use treelet::{
-    COUNT_BITS, COUNT_OVERFLOW, LEAF, MAX_BLOCKS, ORDER, OrderTable, Treelet, leaf_code, leaf_parts,
+    COUNT_BITS, COUNT_OVERFLOW, LEAF, LEVELS, MAX_LINES, ORDER, OrderTable, Treelet, code_line,
+    code_offset, leaf_code, treelet_code,
 };
 pub use validate::WideFault;
 
 use crate::aabb::Aabb;
 
 /// Largest number of treelets on a path; sizes the stacks of the kernels.
-pub const MAX_WIDE_DEPTH: usize = crate::tree::MAX_DEPTH.div_ceil(3);
+pub const MAX_WIDE_DEPTH: usize = crate::tree::MAX_DEPTH.div_ceil(LEVELS);
 
 /// A compiled tree.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct WideTree {
     bounds: Aabb,
     root: u32,
-    treelets: Vec<Treelet>,
-    blocks: Vec<Block>,
+    lines: Lines,
+    treelets: usize,
+    blocks: usize,
     overflow: Vec<(u32, u32)>,
     has_shapes: bool,
 }
@@ -35,15 +39,23 @@ pub struct WideTree {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CompileError {
-    /// More blocks than a leaf code can address.
+    /// More cache lines than a code can address.
     #[error(
-        "the tree needs {needed} leaf blocks, at most {max} can be addressed; lower max_duplication"
+        "the tree needs {needed} cache lines, at most {max} can be addressed; lower max_duplication"
     )]
-    TooManyBlocks {
-        /// Blocks needed.
+    TooLarge {
+        /// Lines needed.
         needed: usize,
         /// The limit.
         max: usize,
+    },
+    /// The system has not enough memory.
+    #[error("the tree needs {bytes} bytes, which the system refused: {reason}")]
+    Memory {
+        /// Bytes needed.
+        bytes: usize,
+        /// What the system said.
+        reason: String,
     },
 }
 
@@ -58,21 +70,33 @@ impl WideTree {
         self.root
     }
 
-    /// All treelets.
-    pub fn treelets(&self) -> &[Treelet] {
-        &self.treelets
-    }
-
-    /// All leaf blocks.
-    pub fn blocks(&self) -> &[Block] {
-        &self.blocks
-    }
-
-    /// First block and number of blocks of a leaf code.
+    /// Treelets and blocks as they lie in memory.
     #[inline(always)]
-    pub fn leaf_blocks(&self, code: u32) -> (u32, u32) {
-        let (first, count) = leaf_parts(code);
-        if count == COUNT_OVERFLOW { (first, self.overflow_count(first)) } else { (first, count) }
+    pub fn lines(&self) -> &Lines {
+        &self.lines
+    }
+
+    /// Number of treelets.
+    pub fn treelets(&self) -> usize {
+        self.treelets
+    }
+
+    /// Number of leaf blocks.
+    pub fn blocks(&self) -> usize {
+        self.blocks
+    }
+
+    /// Number of blocks of a leaf code.
+    #[inline(always)]
+    pub fn block_count(&self, code: u32) -> u32 {
+        let count = code & COUNT_OVERFLOW;
+        if count == COUNT_OVERFLOW { self.overflow_count(code_line(code) as u32) } else { count }
+    }
+
+    /// The lines on which the blocks of a leaf begin.
+    pub fn block_lines(&self, code: u32) -> impl Iterator<Item = usize> + use<> {
+        let first = code_line(code);
+        (0..self.block_count(code) as usize).map(move |i| first + i * BLOCK_LINES)
     }
 
     #[cold]
@@ -86,8 +110,8 @@ impl WideTree {
         self.has_shapes
     }
 
-    /// Bytes of treelets and blocks.
+    /// Bytes of the tree, its own copy of the triangles included.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.treelets[..]) + size_of_val(&self.blocks[..])
+        self.lines.len() * LINE + size_of_val(&self.overflow[..])
     }
 }

@@ -8,14 +8,14 @@
 /// bytes 32..64   child[c]: c is the path from the root, first level in bit 2; upper side is 1
 ///
 /// child code     0                 an empty cell
-///                bit 31 clear      index of a treelet (0 is a dummy, the root is 1)
-///                bit 31 set        leaf: bits 30..4 first block, bits 3..0 number of blocks;
-///                                  15 blocks mean that the true number stands in the overflow list
+///                bit 31 clear      treelet: bits 30..4 its line (line 0 is a dummy), bits 3..0 are 0
+///                bit 31 set        leaf: bits 30..4 line of the first block, bits 3..0 number of
+///                                  blocks; 15 mean that the number stands in the overflow list
 /// ```
 /// A subtree of fewer levels fills the lowest child of its absent planes; +inf keeps rays on that
 /// side of them, and the other side is an empty cell.
 #[repr(C, align(64))]
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Treelet {
     /// Split positions in heap order.
     pub plane: [f32; 7],
@@ -33,8 +33,10 @@ pub const LEAF: u32 = 1 << 31;
 pub const COUNT_BITS: u32 = 4;
 /// The count that refers to the overflow list.
 pub const COUNT_OVERFLOW: u32 = (1 << COUNT_BITS) - 1;
-/// Largest number of blocks in a tree.
-pub const MAX_BLOCKS: usize = 1 << (31 - COUNT_BITS);
+/// Binary levels of a treelet.
+pub const LEVELS: usize = 3;
+/// Largest number of cache lines of a tree.
+pub const MAX_LINES: usize = 1 << (31 - COUNT_BITS);
 
 impl Treelet {
     /// A treelet without planes and children.
@@ -46,15 +48,27 @@ impl Treelet {
     }
 }
 
-/// The code of a leaf of `count` blocks from `first` on.
-pub fn leaf_code(first: u32, count: u32) -> u32 {
-    LEAF | first << COUNT_BITS | count.min(COUNT_OVERFLOW)
+/// The code of a treelet.
+pub fn treelet_code(line: u32) -> u32 {
+    line << COUNT_BITS
 }
 
-/// First block and stored count of a leaf code.
+/// The code of a leaf of `count` blocks from `line` on.
+pub fn leaf_code(line: u32, count: u32) -> u32 {
+    LEAF | line << COUNT_BITS | count.min(COUNT_OVERFLOW)
+}
+
+/// The line of a cell: of its treelet or its first block.
 #[inline(always)]
-pub fn leaf_parts(code: u32) -> (u32, u32) {
-    ((code & !LEAF) >> COUNT_BITS, code & COUNT_OVERFLOW)
+pub fn code_line(code: u32) -> usize {
+    ((code & !LEAF) >> COUNT_BITS) as usize
+}
+
+/// Offset in bytes of a cell's line.
+#[inline(always)]
+pub fn code_offset(code: u32) -> usize {
+    const SHIFT: u32 = super::lines::LINE.trailing_zeros() - COUNT_BITS;
+    ((code & !LEAF & !COUNT_OVERFLOW) as usize) << SHIFT
 }
 
 /// For each combination of direction signs on the seven planes: the children from far to near.

@@ -1,6 +1,8 @@
 //! Does a wide tree hold the cells of its binary tree?
 
-use super::{ID_MASK, LEAF, NO_ID, WIDTH, WideTree};
+use super::{
+    BLOCK_LINES, COUNT_OVERFLOW, ID_MASK, LEAF, LEVELS, NO_ID, WIDTH, WideTree, code_line,
+};
 use crate::tree::{BspTree, NodeKind};
 
 /// The first thing found wrong with a wide tree.
@@ -8,19 +10,17 @@ use crate::tree::{BspTree, NodeKind};
 #[non_exhaustive]
 pub enum WideFault {
     /// A child code points nowhere.
-    #[error("child {child} of treelet {treelet} points beyond the {what}")]
+    #[error("child {child} of treelet {treelet:#x} points outside of the tree")]
     Range {
-        /// The treelet.
+        /// Code of the treelet.
         treelet: u32,
         /// Its child.
         child: usize,
-        /// The array that is too short.
-        what: &'static str,
     },
     /// The planes below a treelet are not those of the binary tree.
-    #[error("treelet {treelet} does not hold the planes of node {node}")]
+    #[error("treelet {treelet:#x} does not hold the planes of node {node}")]
     Planes {
-        /// The treelet.
+        /// Code of the treelet.
         treelet: u32,
         /// The binary node that it should stand for.
         node: u32,
@@ -47,13 +47,16 @@ impl WideTree {
                 self.check_leaf(tree, code, node, parent, child)?;
                 continue;
             }
-            let range = WideFault::Range { treelet: parent, child, what: "treelets" };
-            let treelet = self.treelets.get(code as usize).ok_or(range)?;
+            let line = code_line(code);
+            if line == 0 || line >= self.lines.len() || code & COUNT_OVERFLOW != 0 {
+                return Err(WideFault::Range { treelet: parent, child });
+            }
+            let treelet = self.lines.treelet(line);
             let mut roots = [None; 8];
             let mut open = vec![(node, 0, 0, 0)];
             while let Some((node, level, heap, path)) = open.pop() {
                 match tree.kind(node) {
-                    NodeKind::Inner { axis, split, left, right } if level < 3 => {
+                    NodeKind::Inner { axis, split, left, right } if level < LEVELS => {
                         if treelet.plane[heap] != split || treelet.axis(heap) != axis {
                             return Err(WideFault::Planes { treelet: code, node });
                         }
@@ -88,13 +91,13 @@ impl WideTree {
         if code == 0 {
             return if expected.is_empty() { Ok(()) } else { Err(fault) };
         }
-        let (first, count) = self.leaf_blocks(code);
-        let range = WideFault::Range { treelet, child, what: "blocks" };
-        let blocks = self.blocks.get(first as usize..).and_then(|b| b.get(..count as usize));
-        let blocks = blocks.ok_or(range)?;
-        let ids = blocks.iter().flat_map(|b| b.id).map(|id| id & ID_MASK);
+        let lines: Vec<usize> = self.block_lines(code).collect();
+        if lines.iter().any(|&line| line == 0 || line + BLOCK_LINES > self.lines.len()) {
+            return Err(WideFault::Range { treelet, child });
+        }
+        let ids = lines.iter().flat_map(|&line| self.lines.block(line).id).map(|id| id & ID_MASK);
         let held: Vec<u32> = ids.filter(|&id| id != NO_ID).collect();
-        let full = count as usize == expected.len().div_ceil(WIDTH);
+        let full = lines.len() == expected.len().div_ceil(WIDTH);
         if held == expected && full { Ok(()) } else { Err(fault) }
     }
 }

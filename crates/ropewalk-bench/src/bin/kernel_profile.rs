@@ -1,0 +1,86 @@
+//! Nanoseconds and counted events per ray of the batch kernels, without peers.
+//!
+//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL]`, names separated by commas.
+
+use anyhow::Context;
+use ropewalk::kernel::{BatchCaster, Level};
+use ropewalk_bench::answer::BenchHit;
+use ropewalk_bench::harness::{Clock, Engine};
+use ropewalk_bench::own::Wave;
+use ropewalk_bench::scene::Catalog;
+use ropewalk_bench::workload::{Generator, Kind, Question, Sizes};
+use std::path::PathBuf;
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let list = |i: usize| {
+        let text: &str = arguments.get(i).map_or("", String::as_str);
+        text.split(',').filter(|s| !s.is_empty()).map(str::to_owned).collect::<Vec<String>>()
+    };
+    let rounds: usize = arguments.get(2).map_or(Ok(9), |n| n.parse())?;
+    let level = match arguments.get(3) {
+        Some(name) => Level::ALL.into_iter().find(|l| l.name() == name).context("no such level")?,
+        None => Level::best(),
+    };
+    let catalog =
+        Catalog { data: PathBuf::from("../shared/data"), generated: "target/bench-scenes".into() };
+    println!(
+        "{:12} {:9} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6}",
+        "scene", "workload", "Mrays/s", "ns/ray", "steps", "leaves", "blocks", "clear", "open"
+    );
+    for entry in Catalog::select(&list(0))? {
+        let scene = catalog.load(&entry)?;
+        let engine = Wave::build(&scene.mesh, 1)?;
+        let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engine.closest(rays, out);
+        let sizes = Sizes { side: 512, chords: 16_384, walk: 1 << 18 };
+        let generator = Generator::new(&scene, sizes, &trace);
+        for name in list(1) {
+            let kind = Kind::named(&name).with_context(|| format!("no workload {name}"))?;
+            let rays = generator.workload(kind).rays;
+            let caster = engine.caster().with_level(level).context("level not available")?;
+            let ns = time(&caster, kind.question(), &rays, rounds);
+            let events = match kind.question() {
+                Question::Occluded => caster.occluded_events(&rays),
+                _ => caster.closest_hit_events(&rays),
+            };
+            let n = rays.len() as f64;
+            let per = |count: u64| count as f64 / n;
+            println!(
+                "{:12} {name:9} {:7.2} {ns:7.1} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
+                entry.name,
+                1e3 / ns,
+                per(events.steps),
+                per(events.leaves),
+                per(events.blocks),
+                per(events.clear),
+                per(events.open)
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Median nanoseconds of thread CPU time a ray.
+fn time(
+    caster: &BatchCaster<'_>,
+    question: Question,
+    rays: &[ropewalk::Ray],
+    rounds: usize,
+) -> f64 {
+    let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
+    let mut hit = vec![false; rays.len()];
+    let mut all: Vec<f64> = (0..rounds)
+        .map(|_| {
+            let clock = Clock::start();
+            match question {
+                Question::Occluded => caster.occluded_into(rays, &mut hit),
+                Question::AllHits => drop(caster.all_hits(rays)),
+                Question::FirstHits(k) => drop(caster.first_hits(rays, k)),
+                _ => caster.closest_hit_into(rays, &mut t, &mut prim),
+            }
+            clock.elapsed().0 * 1e9 / rays.len() as f64
+        })
+        .collect();
+    all.sort_by(f64::total_cmp);
+    all[rounds / 2]
+}

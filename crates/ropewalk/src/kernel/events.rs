@@ -1,0 +1,58 @@
+//! Counted events of a batch.
+
+/// What a kernel does, counted or not. The kernels are generic over this, so that a run without
+/// counters pays nothing.
+pub trait Events {
+    /// A ray is under way.
+    #[inline(always)]
+    fn ray(&mut self) {}
+    /// A ray steps through a treelet.
+    #[inline(always)]
+    fn step(&mut self) {}
+    /// A ray visits a leaf.
+    #[inline(always)]
+    fn leaf(&mut self) {}
+    /// A block is tested; so many of its lanes are hit for sure, so many are open.
+    #[inline(always)]
+    fn block(&mut self, _clear: u32, _open: u32) {}
+}
+
+/// No counters.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoEvents;
+
+impl Events for NoEvents {}
+
+/// The events of a batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct BatchEvents {
+    /// Rays that reach the scene's box.
+    pub rays: u64,
+    /// Steps through treelets.
+    pub steps: u64,
+    /// Leaves visited, the one that ends a ray's stack not counted.
+    pub leaves: u64,
+    /// Blocks of eight primitives tested.
+    pub blocks: u64,
+    /// Triangles hit for sure, as `f32` sees it.
+    pub clear: u64,
+    /// Triangles decided in `f64`; in addition each first hit takes its parameter from there.
+    pub open: u64,
+}
+
+impl Events for BatchEvents {
+    fn ray(&mut self) {
+        self.rays += 1;
+    }
+    fn step(&mut self) {
+        self.steps += 1;
+    }
+    fn leaf(&mut self) {
+        self.leaves += 1;
+    }
+    fn block(&mut self, clear: u32, open: u32) {
+        self.blocks += 1;
+        self.clear += u64::from(clear.count_ones());
+        self.open += u64::from(open.count_ones());
+    }
+}
