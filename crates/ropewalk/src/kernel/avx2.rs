@@ -3,7 +3,7 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::level::{Found, Range, Simd};
+use super::level::{Found, Nearest, Range, Simd};
 use super::slot::Slot;
 use super::x86::{self, Children};
 use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
@@ -104,6 +104,36 @@ impl Simd for Avx2 {
                 _mm256_or_ps(_mm256_andnot_ps(inside, meets), _mm256_andnot_ps(clear, reached));
             let mask = |v| _mm256_movemask_ps(v) as u32;
             Found { clear: mask(clear), open: mask(open) }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn nearest(clear: u32, range: &Range) -> Nearest {
+        // SAFETY: the caller vouches for the features; the loads are of whole aligned rows.
+        unsafe {
+            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let lanes = _mm256_and_si256(_mm256_set1_epi32(clear as i32), bits);
+            let lanes = _mm256_castsi256_ps(_mm256_cmpeq_epi32(lanes, bits));
+            let high = _mm256_load_ps(range.high.as_ptr());
+            let high = _mm256_blendv_ps(_mm256_set1_ps(f32::INFINITY), high, lanes);
+            let least = x86::least(high);
+            let lane = _mm256_and_ps(lanes, _mm256_cmp_ps::<_CMP_EQ_OQ>(high, least));
+            let lane = (_mm256_movemask_ps(lane).trailing_zeros() & 7) as usize;
+            let low = _mm256_load_ps(range.low.as_ptr());
+            let rivals = _mm256_and_ps(lanes, _mm256_cmp_ps::<_CMP_LE_OQ>(low, least));
+            let rivals = _mm256_movemask_ps(rivals) as u32 & !(1 << lane);
+            Nearest { lane, high: _mm256_cvtss_f32(least), rivals }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn others(block: &Block, prim_id: u32) -> u32 {
+        // SAFETY: the caller vouches for the features; the load is of a whole aligned row.
+        unsafe {
+            let id = _mm256_load_si256(block.id.as_ptr().cast());
+            let id = _mm256_and_si256(id, _mm256_set1_epi32(ID_MASK as i32));
+            let same = _mm256_cmpeq_epi32(id, _mm256_set1_epi32(prim_id as i32));
+            !_mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32 & 0xFF
         }
     }
 

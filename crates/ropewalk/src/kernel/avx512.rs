@@ -3,7 +3,7 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::level::{Found, Range, Simd};
+use super::level::{Found, Nearest, Range, Simd};
 use super::slot::Slot;
 use super::x86::{self, Children};
 use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
@@ -66,6 +66,33 @@ impl Simd for Avx512 {
             let clear = _mm256_mask_testn_epi32_mask(clear, id, sides);
             let open = (meets & !inside) | (reached & !clear);
             Found { clear: u32::from(clear), open: u32::from(open) }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn nearest(clear: u32, range: &Range) -> Nearest {
+        // SAFETY: the caller vouches for the features; the loads are of whole aligned rows.
+        unsafe {
+            let clear = clear as u8;
+            let far = _mm256_set1_ps(f32::INFINITY);
+            let high = _mm256_mask_load_ps(far, clear, range.high.as_ptr());
+            let least = x86::least(high);
+            let lane = _mm256_mask_cmp_ps_mask::<_CMP_EQ_OQ>(clear, high, least);
+            let lane = (lane.trailing_zeros() & 7) as usize;
+            let low = _mm256_load_ps(range.low.as_ptr());
+            let rivals = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(clear, low, least);
+            let rivals = u32::from(rivals) & !(1 << lane);
+            Nearest { lane, high: _mm256_cvtss_f32(least), rivals }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn others(block: &Block, prim_id: u32) -> u32 {
+        // SAFETY: the caller vouches for the features; the load is of a whole aligned row.
+        unsafe {
+            let id = _mm256_load_si256(block.id.as_ptr().cast());
+            let id = _mm256_and_si256(id, _mm256_set1_epi32(ID_MASK as i32));
+            u32::from(_mm256_cmpneq_epi32_mask(id, _mm256_set1_epi32(prim_id as i32)))
         }
     }
 

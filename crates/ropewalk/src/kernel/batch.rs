@@ -80,11 +80,11 @@ impl<'a> BatchCaster<'a> {
     pub fn closest_hit_into(&self, rays: &[Ray], t: &mut [f32], prim_id: &mut [u32]) {
         assert!(t.len() == rays.len() && prim_id.len() == rays.len(), "one entry a ray");
         if self.is_serial(rays) {
-            return self.run(rays, &mut Closest { t, prim: prim_id });
+            return self.run(rays, &mut Closest::new(t, prim_id));
         }
         let chunks = t.par_chunks_mut(TASK).zip(prim_id.par_chunks_mut(TASK));
         rays.par_chunks(TASK).zip(chunks).for_each(|(rays, (t, prim))| {
-            self.run(rays, &mut Closest { t, prim });
+            self.run(rays, &mut Closest::new(t, prim));
         });
     }
 
@@ -156,7 +156,7 @@ impl<'a> BatchCaster<'a> {
     pub fn closest_hit_events(&self, rays: &[Ray]) -> BatchEvents {
         let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
         let mut events = BatchEvents::default();
-        self.run_counted(rays, &mut Closest { t: &mut t, prim: &mut prim }, &mut events);
+        self.run_counted(rays, &mut Closest::new(&mut t, &mut prim), &mut events);
         events
     }
 

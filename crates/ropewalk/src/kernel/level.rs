@@ -75,6 +75,17 @@ pub struct Range {
     pub high: [f32; WIDTH],
 }
 
+/// What [`Simd::nearest`] finds.
+#[derive(Clone, Copy, Debug)]
+pub struct Nearest {
+    /// The lane.
+    pub lane: usize,
+    /// Its upper bound.
+    pub high: f32,
+    /// Lanes that may be as near.
+    pub rivals: u32,
+}
+
 /// Relative error of a parameter interpolated between the depths of a triangle's vertices, added to
 /// what the edge functions' errors contribute: three roundings in a depth, eight in the
 /// interpolation, and one more where the exact parameter is rounded.
@@ -107,6 +118,19 @@ pub trait Simd: Copy {
     /// # Safety
     /// See the trait.
     unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found;
+
+    /// The clear lane with the smallest upper bound, that bound, and the other clear lanes whose
+    /// lower bound does not lie above it. Lane 0 and infinity without clear lanes.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn nearest(clear: u32, range: &Range) -> Nearest;
+
+    /// The lanes of a block whose primitive is not `prim_id`.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn others(block: &Block, prim_id: u32) -> u32;
 
     /// Asks for a cache line.
     ///

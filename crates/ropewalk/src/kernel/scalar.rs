@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code)]
 
-use super::level::{DEPTH_SLACK, Found, Range, Simd, WEIGHT_SLACK};
+use super::level::{DEPTH_SLACK, Found, Nearest, Range, Simd, WEIGHT_SLACK};
 use super::slot::{Slot, later};
 use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
 
@@ -85,6 +85,28 @@ impl Simd for Scalar {
             }
         }
         found
+    }
+
+    #[inline(always)]
+    unsafe fn nearest(clear: u32, range: &Range) -> Nearest {
+        let is_clear = |lane: &usize| clear >> lane & 1 == 1;
+        let mut nearest = Nearest { lane: 0, high: f32::INFINITY, rivals: 0 };
+        for lane in (0..WIDTH).filter(is_clear) {
+            if range.high[lane] < nearest.high {
+                nearest = Nearest { lane, high: range.high[lane], rivals: 0 };
+            }
+        }
+        for lane in (0..WIDTH).filter(is_clear) {
+            let rival = lane != nearest.lane && range.low[lane] <= nearest.high;
+            nearest.rivals |= u32::from(rival) << lane;
+        }
+        nearest
+    }
+
+    #[inline(always)]
+    unsafe fn others(block: &Block, prim_id: u32) -> u32 {
+        let differs = |lane: usize| block.id[lane] & ID_MASK != prim_id;
+        (0..WIDTH).map(|lane| u32::from(differs(lane)) << lane).sum()
     }
 
     #[inline(always)]

@@ -20,7 +20,7 @@ use super::events::Events;
 use super::exact::{Exact, place};
 use super::extreme;
 use super::level::{Found, Range, Simd};
-use super::query::{BatchQuery, ClearHit};
+use super::query::{BatchQuery, Clear};
 use super::slot::{Loaded, STACK, Slot, earlier};
 use crate::geometry::Geometry;
 use crate::ray::{PreparedRay, Ray};
@@ -106,6 +106,7 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
             }
         }
     }
+    wave.query.end(&exact);
 }
 
 impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
@@ -256,21 +257,14 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
         let block = unsafe { &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>() };
         let mut range = Range::default();
         // SAFETY: passed on to the caller.
-        let Found { mut clear, mut open } = unsafe { L::test(slot, block, &mut range) };
+        let Found { clear, mut open } = unsafe { L::test(slot, block, &mut range) };
         self.events.block(clear, open);
-        while clear != 0 {
-            let lane = clear.trailing_zeros() as usize & (WIDTH - 1);
-            let hit = ClearHit {
-                prim_id: block.id[lane] & ID_MASK,
-                at: place(line, lane),
-                low: range.low[lane],
-                high: range.high[lane],
-            };
-            if !self.query.take_clear(k as usize, slot, &hit) {
-                open |= 1 << lane;
-            }
-            clear &= clear - 1;
+        if clear | open == 0 && !SHAPES {
+            return;
         }
+        let hits = Clear { lanes: clear, range: &range, block, line };
+        // SAFETY: passed on to the caller.
+        open |= unsafe { self.query.take_clear::<L>(slot, &hits) };
         while open != 0 {
             let lane = open.trailing_zeros() as usize & (WIDTH - 1);
             if let Some(hit) = self.exact.hit(slot.ray, place(line, lane)) {

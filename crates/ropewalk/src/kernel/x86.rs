@@ -156,6 +156,20 @@ pub unsafe fn parameters(lanes: &Lanes) -> (__m256, __m256) {
     }
 }
 
+/// The smallest lane, in all lanes.
+///
+/// # Safety
+/// As for [`children`].
+#[inline(always)]
+pub unsafe fn least(x: __m256) -> __m256 {
+    // SAFETY: the caller vouches for the features.
+    unsafe {
+        let x = _mm256_min_ps(x, _mm256_permute2f128_ps::<1>(x, x));
+        let x = _mm256_min_ps(x, _mm256_permute_ps::<0b01_00_11_10>(x));
+        _mm256_min_ps(x, _mm256_permute_ps::<0b10_11_00_01>(x))
+    }
+}
+
 /// Asks for the cache line of any address at all.
 #[inline(always)]
 pub fn prefetch(address: *const u8) {
