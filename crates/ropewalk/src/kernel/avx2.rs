@@ -77,9 +77,6 @@ impl Simd for Avx2 {
                 _mm256_cmp_ps::<_CMP_GE_OQ>(farthest, t_min),
             );
             let meets = _mm256_andnot_ps(outside, meets);
-            if _mm256_movemask_ps(meets) == 0 {
-                return Found::default();
-            }
             let (low, high) = x86::parameters(&lanes);
             _mm256_store_ps(range.low.as_mut_ptr(), low);
             _mm256_store_ps(range.high.as_mut_ptr(), high);

@@ -48,9 +48,6 @@ impl Simd for Avx512 {
             let farthest = _mm256_add_ps(lanes.far, lanes.blur);
             let meets = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(!outside, nearest, limit);
             let meets = _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(meets, farthest, t_min);
-            if meets == 0 {
-                return Found::default();
-            }
             let (low, high) = x86::parameters(&lanes);
             _mm256_store_ps(range.low.as_mut_ptr(), low);
             _mm256_store_ps(range.high.as_mut_ptr(), high);

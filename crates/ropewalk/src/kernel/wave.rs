@@ -61,6 +61,30 @@ impl List {
     }
 }
 
+/// Blocks to be tested, each with a number: how many of its leaf are left, or which lanes.
+struct Tests {
+    slot: [u8; 32],
+    line: [u32; 32],
+    number: [u32; 32],
+    len: usize,
+}
+
+impl Tests {
+    const EMPTY: Tests = Tests { slot: [0; 32], line: [0; 32], number: [0; 32], len: 0 };
+
+    #[inline(always)]
+    fn set(&mut self, i: usize, k: u8, line: u32, number: u32) {
+        self.slot[i & 31] = k;
+        self.line[i & 31] = line;
+        self.number[i & 31] = number;
+    }
+
+    #[inline(always)]
+    fn get(&self, i: usize) -> (u8, u32, u32) {
+        (self.slot[i & 31], self.line[i & 31], self.number[i & 31])
+    }
+}
+
 /// A batch on its way.
 struct Wave<'a, Q, E> {
     tree: &'a WideTree,
@@ -187,19 +211,8 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
     #[inline(always)]
     unsafe fn leaf_phase<L: Simd, const SHAPES: bool>(&mut self) {
         let n = std::mem::take(&mut self.waiting.len);
-        for i in 0..n {
-            let (k, code) = self.waiting.get(i);
-            let count = self.tree.block_count(code);
-            if count > 0 {
-                self.events.leaf();
-            }
-            let mut line = code_line(code);
-            for _ in 0..count {
-                // SAFETY: passed on to the caller.
-                unsafe { self.test_block::<L, SHAPES>(k, line) };
-                line += BLOCK_LINES;
-            }
-        }
+        // SAFETY: passed on to the caller.
+        unsafe { self.test_leaves::<L, SHAPES>(n) };
         let (mut waiting, mut stepping) = (0, self.stepping.len);
         let (mut done, mut finished) = ([0u8; 32], 0);
         for i in 0..n {
@@ -249,31 +262,80 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
         (below == 0) | behind | (Q::ANY & (slot.best_id != u32::MAX))
     }
 
-    /// Tests the primitives of a block against the ray of slot `k`.
+    /// Tests the leaves of the first `n` waiting rays: all first blocks, all second blocks, and so
+    /// on, so that no test waits for the outcome of the one before.
     #[inline(always)]
-    unsafe fn test_block<L: Simd, const SHAPES: bool>(&mut self, k: u8, line: usize) {
-        let slot = &mut self.slots[k as usize];
-        // SAFETY: the codes of a tree lead to its blocks.
-        let block = unsafe { &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>() };
-        let mut range = Range::default();
-        // SAFETY: passed on to the caller.
-        let Found { clear, mut open } = unsafe { L::test(slot, block, &mut range) };
-        self.events.block(clear, open);
-        if clear | open == 0 && !SHAPES {
-            return;
+    unsafe fn test_leaves<L: Simd, const SHAPES: bool>(&mut self, n: usize) {
+        let mut tests = Tests::EMPTY;
+        for i in 0..n {
+            let (k, code) = self.waiting.get(i);
+            let count = self.tree.block_count(code);
+            tests.set(tests.len, k, code_line(code) as u32, count);
+            tests.len += usize::from(count > 0);
         }
-        let hits = Clear { lanes: clear, range: &range, block, line };
-        // SAFETY: passed on to the caller.
-        open |= unsafe { self.query.take_clear::<L>(slot, &hits) };
-        while open != 0 {
-            let lane = open.trailing_zeros() as usize & (WIDTH - 1);
+        for _ in 0..tests.len {
+            self.events.leaf();
+        }
+        while tests.len > 0 {
+            let n = std::mem::take(&mut tests.len);
+            let (mut open, mut unsettled) = (Tests::EMPTY, 0);
+            for i in 0..n {
+                let (k, line, left) = tests.get(i);
+                // SAFETY: the codes of a tree lead to its blocks; the rest passed on to the caller.
+                let lanes = unsafe { self.test_block::<L, SHAPES>(k, line as usize) };
+                open.set(unsettled, k, line, lanes);
+                unsettled += usize::from(lanes != 0);
+                tests.set(tests.len, k, line + BLOCK_LINES as u32, left - 1);
+                tests.len += usize::from(left > 1);
+            }
+            for i in 0..tests.len {
+                let (_, line, _) = tests.get(i);
+                let block = self.tree.lines().as_ptr().wrapping_add(line as usize * LINE);
+                for line in 0..BLOCK_LINES {
+                    // SAFETY: passed on to the caller.
+                    unsafe { L::prefetch(block.wrapping_add(line * LINE)) };
+                }
+            }
+            for i in 0..unsettled {
+                let (k, line, lanes) = open.get(i);
+                self.decide(k, line as usize, lanes);
+            }
+        }
+    }
+
+    /// Tests a block against the ray of slot `k`; the lanes that need a decision in `f64`.
+    ///
+    /// No branches: which blocks hold a hit cannot be predicted, and a wrong guess would cost more
+    /// than a test.
+    #[inline(always)]
+    unsafe fn test_block<L: Simd, const SHAPES: bool>(&mut self, k: u8, line: usize) -> u32 {
+        // SAFETY: the caller vouches for the slot, the line and the features.
+        unsafe {
+            let slot = &mut *self.slots.as_mut_ptr().add(k as usize);
+            let block = &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>();
+            let mut range = Range::default();
+            let Found { clear, open } = L::test(slot, block, &mut range);
+            self.events.block(clear, open);
+            let hits = Clear { lanes: clear, range: &range, block, line };
+            let open = open | self.query.take_clear::<L>(slot, &hits);
+            if SHAPES { open | block.shape_lanes() << WIDTH } else { open }
+        }
+    }
+
+    /// Decides the lanes of a block exactly: triangles in bits 7..0, others in bits 15..8.
+    #[cold]
+    fn decide(&mut self, k: u8, line: usize, mut lanes: u32) {
+        if lanes >> WIDTH != 0 {
+            self.test_shapes(k, line);
+            lanes &= (1 << WIDTH) - 1;
+        }
+        let slot = &mut self.slots[k as usize];
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
             if let Some(hit) = self.exact.hit(slot.ray, place(line, lane)) {
                 self.query.take(k as usize, slot, &hit, &self.exact);
             }
-            open &= open - 1;
-        }
-        if SHAPES && block.shape_lanes() != 0 {
-            self.test_shapes(k, line);
+            lanes &= lanes - 1;
         }
     }
 
