@@ -8,6 +8,7 @@
 ///
 /// `t` is measured in lengths of `dir`, which need not be normalised. A ray with a NaN component,
 /// an infinite origin or direction, a zero direction or `t_min > t_max` hits nothing.
+#[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start point.
@@ -71,9 +72,9 @@ impl Hit {
 pub struct Shear {
     /// Axis order; the last is the axis of the largest direction component.
     pub k: [usize; 3],
-    /// Origin of the ray, in the order x, y, z.
+    /// Origin of the ray in the order of `k`.
     pub origin: [f64; 3],
-    /// Shear constants `(dx/dz, dy/dz, 1/dz)` in the order of `k`.
+    /// Shear constants `(dx/dz, dy/dz, 1/dz)`.
     pub shear: [f64; 3],
 }
 
@@ -81,16 +82,19 @@ impl Shear {
     /// The frame of a valid ray.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        let d = ray.dir.map(f32::abs);
-        let y = usize::from(d[1] > d[0]);
-        let kz = if d[2] > d[y] { 2 } else { y };
+        let [x, y, z] = ray.dir;
+        let kz = usize::from(y.abs() > x.abs());
+        let kz = if z.abs() > ray.dir[kz].abs() { 2 } else { kz };
         // Swapped where the ray looks down, which keeps the winding.
-        let (next, last) = ([1, 2, 0][kz], [2, 0, 1][kz]);
-        let (kx, ky) = if ray.dir[kz] < 0.0 { (last, next) } else { (next, last) };
-        let [dx, dy, dz] = [kx, ky, kz].map(|a| f64::from(ray.dir[a]));
+        let down = usize::from(ray.dir[kz] < 0.0);
+        let kx = (kz + 1 + down) % 3;
+        let ky = (kz + 2 - down) % 3;
+        let dz = f64::from(ray.dir[kz]);
+        let (dx, dy) = (f64::from(ray.dir[kx]), f64::from(ray.dir[ky]));
+        let origin = |a: usize| f64::from(ray.origin[a]);
         Shear {
             k: [kx, ky, kz],
-            origin: ray.origin.map(f64::from),
+            origin: [origin(kx), origin(ky), origin(kz)],
             shear: [dx / dz, dy / dz, 1.0 / dz],
         }
     }

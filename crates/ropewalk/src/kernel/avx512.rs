@@ -3,9 +3,10 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::level::{Found, Nearest, Range, Simd};
-use super::slot::Slot;
+use super::level::{Found, Nearest, Range, Root, Simd};
+use super::slot::{Loaded, Slot};
 use super::x86::{self, Children};
+use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
 use std::arch::x86_64::*;
 
@@ -14,6 +15,12 @@ use std::arch::x86_64::*;
 pub struct Avx512;
 
 impl Simd for Avx512 {
+    #[inline(always)]
+    unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loaded {
+        // SAFETY: passed on to the caller.
+        unsafe { x86::load(slot, ray, index, root) }
+    }
+
     #[inline(always)]
     unsafe fn step(slot: &mut Slot, treelet: &Treelet, sp: usize) -> usize {
         debug_assert!(sp + WIDTH <= super::slot::STACK);

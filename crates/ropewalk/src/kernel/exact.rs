@@ -1,7 +1,8 @@
 //! What the filters leave open: decided in `f64`, as the reference walks do.
 
+use crate::primitive::Triangle;
 use crate::ray::{Hit, Ray, Shear};
-use crate::wide::{Lines, WIDTH};
+use crate::wide::{ID_MASK, Lines, WIDTH};
 
 /// A triangle where it lies: the line of its block times eight plus its lane.
 pub type At = u32;
@@ -29,10 +30,10 @@ impl Exact<'_> {
     pub fn hit(&self, ray: u32, at: At) -> Option<Hit> {
         let (block, lane) = (self.lines.block(at as usize / WIDTH), at as usize % WIDTH);
         let ray = &self.rays[ray as usize];
-        let (triangle, sides, prim_id) = block.triangle(lane);
-        let met = triangle.meet(&Shear::new(ray), sides)?;
+        let corner = |i: usize, axis: usize| block.vertex[i][axis][lane];
+        let met = Triangle::meet(corner, &Shear::new(ray), block.sides(lane))?;
         let t = met.t as f32;
         let accepted = t.is_finite() && ray.t_min <= t && t <= ray.t_max;
-        accepted.then_some(Hit { t, prim_id, u: met.u, v: met.v })
+        accepted.then_some(Hit { t, prim_id: block.id[lane] & ID_MASK, u: met.u, v: met.v })
     }
 }

@@ -2,7 +2,9 @@
 
 #![allow(unsafe_code)]
 
-use super::slot::Slot;
+use super::slot::{LARGE, Loaded, Slot};
+use crate::aabb::Aabb;
+use crate::ray::Ray;
 use crate::wide::{Block, Treelet, WIDTH};
 
 /// Instruction set of a kernel. All levels give bit-identical answers.
@@ -55,6 +57,32 @@ impl Level {
     }
 }
 
+/// Where every ray of a batch begins.
+#[repr(C, align(16))]
+#[derive(Clone, Copy, Debug)]
+pub struct Root {
+    /// Lower corner of the scene's box; the fourth lane is padding.
+    pub min: [f32; 4],
+    /// Upper corner.
+    pub max: [f32; 4],
+    /// The same box.
+    pub bounds: Aabb,
+    /// Code of the root cell.
+    pub code: u32,
+    /// True if the box lies within [`LARGE`](super::slot::LARGE).
+    pub is_ordinary: bool,
+}
+
+impl Root {
+    /// The root of a tree.
+    pub fn new(bounds: &Aabb, code: u32) -> Root {
+        let pad = |[x, y, z]: [f32; 3]| [x, y, z, 0.0];
+        let ordinary = |x: &f32| x.abs() <= LARGE;
+        let is_ordinary = bounds.min.iter().chain(&bounds.max).all(ordinary);
+        Root { min: pad(bounds.min), max: pad(bounds.max), bounds: *bounds, code, is_ordinary }
+    }
+}
+
 /// The lanes of a block that a ray may hit.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Found {
@@ -103,6 +131,12 @@ pub const WEIGHT_SLACK: f32 = 4.0;
 /// # Safety
 /// The methods may only run on a machine with the level's features.
 pub trait Simd: Copy {
+    /// [`Slot::load`], which it may call.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loaded;
+
     /// Replaces the top of the slot's stack by the children that the ray's interval reaches,
     /// nearest on top, and returns the new stack pointer.
     ///

@@ -2,8 +2,9 @@
 
 #![allow(unsafe_code)]
 
-use super::level::{DEPTH_SLACK, Found, Nearest, Range, Simd, WEIGHT_SLACK};
-use super::slot::{Slot, later};
+use super::level::{DEPTH_SLACK, Found, Nearest, Range, Root, Simd, WEIGHT_SLACK};
+use super::slot::{Loaded, Slot, TINY, later};
+use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
 
 /// Portable code.
@@ -11,6 +12,11 @@ use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
 pub struct Scalar;
 
 impl Simd for Scalar {
+    #[inline(always)]
+    unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, scene: &Root) -> Loaded {
+        slot.load(ray, index, &scene.bounds, scene.code)
+    }
+
     #[inline(always)]
     unsafe fn step(slot: &mut Slot, treelet: &Treelet, sp: usize) -> usize {
         let mut t = [0.0f32; 7];
@@ -60,10 +66,11 @@ impl Simd for Scalar {
             let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
             let (smallest, largest) = (u.min(v).min(w), u.max(v).max(w));
             let size = |i: usize| a[i].abs().max(b[i].abs()).max(c[i].abs());
-            let slack = slot.edge_slack * (size(0) + size(1));
-            let outside = smallest < -slack && largest > slack;
             let (near, far) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
-            let blur = DEPTH_SLACK * near.abs().max(far.abs());
+            let (reach, sum) = (near.abs().max(far.abs()), size(0) + size(1));
+            let slack = slot.edge_slack * sum * (reach + slot.half_scale * sum) + TINY;
+            let outside = smallest < -slack && largest > slack;
+            let blur = DEPTH_SLACK * reach;
             if outside || !(near - blur <= slot.limit && far + blur >= slot.t_min) {
                 continue;
             }

@@ -25,11 +25,17 @@ pub fn earlier(t: f32) -> f32 {
 }
 
 /// See [`Slot::edge_slack`].
-const EDGE_SLACK: f32 = 32.0 * f32::EPSILON / 2.0;
+pub const EDGE_SLACK: f32 = 16.0 * f32::EPSILON / 2.0;
 
-/// Rays whose coordinates or direction leave this range would overflow or underflow in the filters'
-/// products; they are traced by the exact walk.
-const ORDINARY: std::ops::RangeInclusive<f32> = 1e-12..=1e12;
+/// Added to every bound of an edge function, so that products that underflow decide nothing.
+pub const TINY: f32 = 1e-36;
+
+/// Rays whose origin or direction leave this range, and scenes that do, would overflow in the
+/// filters' products; they are traced by the exact walk.
+pub const LARGE: f32 = 1e12;
+
+/// The largest direction component is at least this.
+pub const SMALL: f32 = 1e-12;
 
 /// What became of a ray that was to be put into a slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,11 +59,15 @@ pub struct Slot {
     pub inv: [f32; 4],
     /// Origin in the shear's axis order.
     pub shear_origin: [f32; 3],
-    /// Error of an edge function per sum of the sheared coordinates' sizes.
+    /// Error bounds of the edge functions: `edge_slack S (T + half_scale S)`, where `S` is the sum of
+    /// the largest sheared coordinates `|x|` and `|y|` and `T` the largest parameter of a triangle.
     ///
-    /// With `u = 2^-24` and `D` the largest offset of the scene's box from the origin, a sheared
-    /// coordinate is off by at most `6 u D` and an edge function `p_x q_y - p_y q_x` by at most
-    /// `20 u D (|x| + |y|)`, `|x|` and `|y|` being the largest sheared coordinates; `32 u D` is kept.
+    /// With `u = 2^-24` and `Z` the largest offset along the shear's axis, a sheared coordinate is
+    /// off by at most `u (2 |x| + 5 Z)`: the offsets by one rounding each, `dx/dz` by two, and three
+    /// in `x - (dx/dz) z`, where `|dx/dz| <= 1`. So an edge function `p_x q_y - p_y q_x`, which adds
+    /// at most four roundings of its products, is off by at most `u S (10 Z + 3 S)`; what is kept is
+    /// `16 u S (Z + S / 2)`. `T` is `Z |1/dz|`, so that `edge_slack` is `16 u |dz|` and `half_scale`
+    /// is `|1/dz| / 2`.
     pub edge_slack: f32,
     /// Shear constants `(dx/dz, dy/dz, 1/dz)`.
     pub shear: [f32; 3],
@@ -75,6 +85,8 @@ pub struct Slot {
     pub best_id: u32,
     /// Where its triangle lies, or `u32::MAX` if `limit` is its exact parameter.
     pub best_at: u32,
+    /// See `edge_slack`.
+    pub half_scale: f32,
     /// Index of the top of the stack.
     pub sp: u32,
     /// True if a direction component is zero.
@@ -85,7 +97,7 @@ pub struct Slot {
     pub enter: [f32; STACK],
     /// Where it leaves them.
     pub exit: [f32; STACK],
-    _pad: [u32; 15],
+    _pad: [u32; 14],
 }
 
 const _: () = assert!(size_of::<Slot>() / 64 % 2 == 1);
@@ -106,31 +118,29 @@ impl Slot {
             best_low: 0.0,
             best_id: 0,
             best_at: 0,
+            half_scale: 0.0,
             sp: 0,
             may_lie_in_plane: false,
             code: [0; STACK],
             enter: [0.0; STACK],
             exit: [0.0; STACK],
-            _pad: [0; 15],
+            _pad: [0; 14],
         }
     }
 
     /// Puts `ray` into the slot with `root` on its stack, unless it cannot hit anything in `bounds`.
-    #[inline(always)]
     pub fn load(&mut self, ray: &Ray, index: u32, bounds: &Aabb, root: u32) -> Loaded {
         if !ray.is_valid() {
             return Loaded::Misses;
         }
         let (mut enter, mut exit) = (ray.t_min, ray.t_max);
         let mut inside = true;
-        let mut reach = 0.0f32;
         for a in 0..3 {
             let (o, d) = (ray.origin[a], ray.dir[a]);
             let inv = 1.0 / d;
             self.origin[a] = o;
             self.inv[a] = inv;
             let (lo, hi) = (bounds.min[a] - o, bounds.max[a] - o);
-            reach = reach.max(lo.abs()).max(hi.abs());
             if d == 0.0 {
                 inside &= lo <= 0.0 && hi >= 0.0;
             } else {
@@ -144,33 +154,44 @@ impl Slot {
         let kz = if size[2] > size[y] { 2 } else { y };
         self.may_lie_in_plane = self.inv[..3].iter().any(|x| x.is_infinite());
         let vanishing = |a: usize| self.inv[a].is_infinite() && ray.dir[a] != 0.0;
-        let extreme = !ORDINARY.contains(&reach) || !ORDINARY.contains(&size[kz]);
-        if extreme || (self.may_lie_in_plane && (0..3).any(vanishing)) {
+        let far = |x: f32| x.abs() > LARGE;
+        let extreme = ray.origin.into_iter().chain(bounds.min).chain(bounds.max).any(far);
+        if extreme
+            || !(SMALL..=LARGE).contains(&size[kz])
+            || (self.may_lie_in_plane && (0..3).any(vanishing))
+        {
             self.start(ray, index);
             return Loaded::Extreme;
         }
         if !(inside && enter <= later(exit)) {
             return Loaded::Misses;
         }
-        let dz = ray.dir[kz];
-        let (next, last) = ([1, 2, 0][kz], [2, 0, 1][kz]);
-        let (kx, ky) = if dz < 0.0 { (last, next) } else { (next, last) };
+        // The winding does not matter here: the filter asks for equal signs, whichever.
+        let (kx, ky) = ([1, 2, 0][kz], [2, 0, 1][kz]);
         let inv_z = self.inv[kz];
         self.k = [kx as u32, ky as u32, kz as u32];
         self.shear_origin = [ray.origin[kx], ray.origin[ky], ray.origin[kz]];
         self.shear = [ray.dir[kx] * inv_z, ray.dir[ky] * inv_z, inv_z];
-        self.edge_slack = EDGE_SLACK * reach;
+        self.edge_slack = EDGE_SLACK * size[kz];
+        self.half_scale = 0.5 * inv_z.abs();
         self.start(ray, index);
+        self.push_root(root, enter, exit);
+        Loaded::Ready
+    }
+
+    /// Empties the stack but for the root.
+    #[inline(always)]
+    pub fn push_root(&mut self, root: u32, enter: f32, exit: f32) {
         self.code[0] = LEAF; // the sentinel: a leaf without blocks ends the ray
         self.code[1] = root;
         self.enter[1] = enter;
         self.exit[1] = exit;
         self.sp = 1;
-        Loaded::Ready
     }
 
+    /// Sets the state of the query.
     #[inline(always)]
-    fn start(&mut self, ray: &Ray, index: u32) {
+    pub fn start(&mut self, ray: &Ray, index: u32) {
         self.t_min = ray.t_min;
         self.limit = ray.t_max;
         self.best_low = f32::INFINITY;

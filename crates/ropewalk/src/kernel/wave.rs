@@ -19,7 +19,7 @@
 use super::events::Events;
 use super::exact::{Exact, place};
 use super::extreme;
-use super::level::{Found, Range, Simd};
+use super::level::{Found, Range, Root, Simd};
 use super::query::{BatchQuery, Clear};
 use super::slot::{Loaded, STACK, Slot, earlier};
 use crate::geometry::Geometry;
@@ -85,17 +85,25 @@ impl Tests {
     }
 }
 
+/// Slots without a ray.
+struct Free {
+    slot: [u8; 32],
+    len: usize,
+}
+
 /// A batch on its way.
 struct Wave<'a, Q, E> {
     tree: &'a WideTree,
     geometry: &'a Geometry,
     exact: Exact<'a>,
+    root: Root,
     slots: &'a mut [Slot],
     query: &'a mut Q,
     events: &'a mut E,
     next: usize,
     stepping: List,
     waiting: List,
+    free: Free,
 }
 
 /// Runs a batch through `slots.len()` slots, [`WAVE`] at most.
@@ -112,25 +120,46 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
     query: &mut Q,
     events: &mut E,
 ) {
+    if tree.root() == 0 {
+        (0..rays.len()).for_each(|index| query.miss(index));
+        return;
+    }
     let width = slots.len().min(WAVE);
     let slots = &mut slots[..width];
     let (stepping, waiting) = (List::EMPTY, List::EMPTY);
     let exact = Exact { lines: tree.lines(), rays };
-    let mut wave = Wave { tree, geometry, exact, slots, query, events, next: 0, stepping, waiting };
-    for k in 0..width as u8 {
+    let root = Root::new(tree.bounds(), tree.root());
+    let free = Free { slot: std::array::from_fn(|k| k as u8), len: width };
+    let mut wave = Wave {
+        tree,
+        geometry,
+        exact,
+        root,
+        slots,
+        query,
+        events,
+        next: 0,
+        stepping,
+        waiting,
+        free,
+    };
+    loop {
         // SAFETY: passed on to the caller.
-        unsafe { wave.refill::<L>(k) };
-    }
-    while wave.stepping.len + wave.waiting.len > 0 {
-        // SAFETY: passed on to the caller.
-        unsafe {
-            wave.step_phase::<L>();
-            if wave.waiting.len * 2 >= width || wave.stepping.len == 0 {
-                wave.leaf_phase::<L, SHAPES>();
+        unsafe { wave.refill::<L>() };
+        while wave.free.len == 0 || wave.next == rays.len() {
+            if wave.stepping.len + wave.waiting.len == 0 {
+                wave.query.end(&exact);
+                return;
+            }
+            // SAFETY: passed on to the caller.
+            unsafe {
+                wave.step_phase::<L>();
+                if wave.waiting.len * 2 >= width || wave.stepping.len == 0 {
+                    wave.leaf_phase::<L, SHAPES>();
+                }
             }
         }
     }
-    wave.query.end(&exact);
 }
 
 impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
@@ -214,7 +243,7 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
         // SAFETY: passed on to the caller.
         unsafe { self.test_leaves::<L, SHAPES>(n) };
         let (mut waiting, mut stepping) = (0, self.stepping.len);
-        let (mut done, mut finished) = ([0u8; 32], 0);
+        let mut free = 0;
         for i in 0..n {
             let (k, _) = self.waiting.get(i);
             // SAFETY: lists hold numbers of slots; the stack pointer stays on the stack.
@@ -226,19 +255,18 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
             let leaf = (code >> 31) as usize;
             // SAFETY: passed on to the caller.
             unsafe { L::prefetch(self.address(code)) };
-            done[finished & 31] = k;
+            self.free.slot[free & 31] = k;
             self.waiting.set(waiting, k, code);
             self.stepping.set(stepping, k, code);
-            finished += usize::from(ended);
+            free += usize::from(ended);
             waiting += leaf & usize::from(!ended);
             stepping += (1 - leaf) & usize::from(!ended);
         }
         self.stepping.len = stepping;
         self.waiting.len = waiting;
-        for k in done.into_iter().take(finished) {
+        self.free.len = free;
+        for &k in &self.free.slot[..free & 31] {
             self.query.finish(k as usize, &mut self.slots[k as usize], &self.exact);
-            // SAFETY: passed on to the caller.
-            unsafe { self.refill::<L>(k) };
         }
         // SAFETY: passed on to the caller.
         unsafe { self.prefetch_blocks::<L>(0) };
@@ -355,24 +383,20 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
         }
     }
 
-    /// Puts the next ray that reaches the scene's box into slot `k`.
+    /// Puts the next rays that reach the scene's box into the free slots.
     #[inline(always)]
-    unsafe fn refill<L: Simd>(&mut self, k: u8) {
-        let (bounds, root) = (self.tree.bounds(), self.tree.root());
-        while self.next < self.exact.rays.len() {
-            let index = self.next;
+    unsafe fn refill<L: Simd>(&mut self) {
+        while self.free.len > 0 && self.next < self.exact.rays.len() {
+            let (index, k) = (self.next, self.free.slot[(self.free.len - 1) & 31]);
             self.next += 1;
-            if root == 0 {
-                self.query.miss(index);
-                continue;
-            }
-            let ray = &self.exact.rays[index];
-            match self.slots[k as usize].load(ray, index as u32, bounds, root) {
+            let (ray, slot) = (&self.exact.rays[index], &mut self.slots[k as usize]);
+            // SAFETY: passed on to the caller.
+            match unsafe { L::load(slot, ray, index as u32, &self.root) } {
                 Loaded::Ready => {
                     self.events.ray();
+                    self.free.len -= 1;
                     // SAFETY: passed on to the caller.
-                    unsafe { self.enlist::<L>(k, root) };
-                    return;
+                    unsafe { self.enlist::<L>(k, self.root.code) };
                 }
                 Loaded::Misses => self.query.miss(index),
                 Loaded::Extreme => self.walk_extreme(k),

@@ -4,10 +4,87 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::level::{DEPTH_SLACK, WEIGHT_SLACK};
-use super::slot::{INTERVAL_SLACK, Slot};
+use super::level::{DEPTH_SLACK, Root, WEIGHT_SLACK};
+use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, SMALL, Slot, TINY, later};
+use crate::ray::Ray;
 use crate::wide::{Block, ORDER, Treelet};
 use std::arch::x86_64::*;
+
+/// Axis orders of the shear by its last axis, as indices into a vector; the last lane stays.
+#[repr(C, align(16))]
+struct ShearOrder([[u32; 4]; 3]);
+
+static SHEAR_ORDER: ShearOrder = ShearOrder([[1, 2, 0, 3], [2, 0, 1, 3], [0, 1, 2, 3]]);
+
+/// The largest lane, in all lanes.
+#[inline(always)]
+unsafe fn most(x: __m128) -> __m128 {
+    // SAFETY: SSE is part of x86-64.
+    unsafe {
+        let x = _mm_max_ps(x, _mm_shuffle_ps::<0b01_00_11_10>(x, x));
+        _mm_max_ps(x, _mm_shuffle_ps::<0b10_11_00_01>(x, x))
+    }
+}
+
+/// [`Slot::load`] for rays without vanishing direction components and other oddities, which go there.
+///
+/// # Safety
+/// The machine must have AVX2 and FMA, and the caller must enable them.
+#[inline(always)]
+pub unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loaded {
+    // SAFETY: the caller vouches for the features; a ray is eight floats, origin first, then
+    // direction and range, and the rows of the slot are four floats long.
+    unsafe {
+        let sign = _mm_set1_ps(-0.0);
+        let origin = _mm_loadu_ps(ray.origin.as_ptr());
+        let dir = _mm_loadu_ps(std::ptr::from_ref(ray).cast::<f32>().add(3));
+        let size = _mm_andnot_ps(sign, dir);
+        let inv = _mm_div_ps(_mm_set1_ps(1.0), dir);
+        let large = _mm_set1_ps(LARGE);
+        // False for NaN; an infinite inverse is a vanishing component.
+        let ordinary = _mm_and_ps(
+            _mm_cmple_ps(_mm_andnot_ps(sign, origin), large),
+            _mm_and_ps(
+                _mm_cmple_ps(size, large),
+                _mm_cmplt_ps(_mm_andnot_ps(sign, inv), _mm_set1_ps(f32::INFINITY)),
+            ),
+        );
+        let size = _mm_blend_ps::<8>(size, _mm_setzero_ps());
+        let longest = most(size);
+        let is_ordinary = root.is_ordinary
+            & (_mm_movemask_ps(ordinary) & 7 == 7)
+            & (_mm_cvtss_f32(longest) >= SMALL)
+            & (ray.t_min <= ray.t_max);
+        if !is_ordinary {
+            return slot.load(ray, index, &root.bounds, root.code);
+        }
+        let axis = _mm_movemask_ps(_mm_cmpeq_ps(size, longest)).trailing_zeros() as usize & 3;
+
+        let near = _mm_mul_ps(_mm_sub_ps(_mm_load_ps(root.min.as_ptr()), origin), inv);
+        let far = _mm_mul_ps(_mm_sub_ps(_mm_load_ps(root.max.as_ptr()), origin), inv);
+        let enter = _mm_blend_ps::<8>(_mm_min_ps(near, far), _mm_set1_ps(ray.t_min));
+        let exit = _mm_blend_ps::<8>(_mm_max_ps(near, far), _mm_set1_ps(ray.t_max));
+        let enter = _mm_cvtss_f32(most(enter));
+        let exit = -_mm_cvtss_f32(most(_mm_xor_ps(exit, sign)));
+
+        let order = SHEAR_ORDER.0.get_unchecked(axis.min(2)).as_ptr();
+        let order = _mm_load_si128(order.cast());
+        let inv_z =
+            _mm_div_ps(_mm_set1_ps(1.0), _mm_permutevar_ps(dir, _mm_set1_epi32(axis as i32)));
+        let shear = _mm_mul_ps(_mm_permutevar_ps(dir, order), inv_z);
+        _mm_store_ps(slot.origin.as_mut_ptr(), origin);
+        _mm_store_ps(slot.inv.as_mut_ptr(), inv);
+        _mm_store_ps(slot.shear_origin.as_mut_ptr(), _mm_permutevar_ps(origin, order));
+        _mm_store_ps(slot.shear.as_mut_ptr(), _mm_blend_ps::<4>(shear, inv_z));
+        _mm_store_si128(slot.k.as_mut_ptr().cast(), order);
+        slot.edge_slack = EDGE_SLACK * _mm_cvtss_f32(longest);
+        slot.half_scale = 0.5 * _mm_cvtss_f32(_mm_andnot_ps(sign, inv_z));
+        slot.may_lie_in_plane = false;
+        slot.start(ray, index);
+        slot.push_root(root.code, enter, exit);
+        if enter <= later(exit) { Loaded::Ready } else { Loaded::Misses }
+    }
+}
 
 /// The eight children of a treelet from far to near, and the ray's interval in each.
 pub struct Children {
@@ -122,13 +199,15 @@ pub unsafe fn lanes(slot: &Slot, block: &Block) -> Lanes {
             let [p, q, r] = [a[i], b[i], c[i]].map(|x| _mm256_andnot_ps(SIGN, x));
             _mm256_max_ps(_mm256_max_ps(p, q), r)
         };
-        let slack = _mm256_set1_ps(slot.edge_slack);
-        let slack = _mm256_mul_ps(slack, _mm256_add_ps(size(0), size(1)));
-        let minus_slack = _mm256_xor_ps(slack, SIGN);
         let near = _mm256_min_ps(_mm256_min_ps(a[2], b[2]), c[2]);
         let far = _mm256_max_ps(_mm256_max_ps(a[2], b[2]), c[2]);
         let reach = _mm256_max_ps(_mm256_andnot_ps(SIGN, near), _mm256_andnot_ps(SIGN, far));
         let blur = _mm256_mul_ps(reach, _mm256_set1_ps(DEPTH_SLACK));
+        let sum = _mm256_add_ps(size(0), size(1));
+        let scale = _mm256_fmadd_ps(sum, _mm256_set1_ps(slot.half_scale), reach);
+        let slack = _mm256_mul_ps(sum, _mm256_set1_ps(slot.edge_slack));
+        let slack = _mm256_fmadd_ps(slack, scale, _mm256_set1_ps(TINY));
+        let minus_slack = _mm256_xor_ps(slack, SIGN);
         let (edge, depth) = ([u, v, w], [a[2], b[2], c[2]]);
         Lanes { edge, depth, low, high, slack, minus_slack, near, far, blur }
     }

@@ -58,18 +58,22 @@ impl Triangle {
         n.map(|x| x / len)
     }
 
-    /// Where the line of a ray meets the triangle on one of `sides`, whatever the ray's range. The
-    /// triangle must not be degenerate.
+    /// Where the line of a ray meets the triangle whose vertex `i` has the coordinate `at(i, axis)`,
+    /// on one of `sides`, whatever the ray's range. The triangle must not be degenerate.
+    ///
+    /// Written out without arrays of vertices: the batch kernels call it for triangles that lie
+    /// elsewhere.
     #[inline(always)]
-    pub fn meet(&self, frame: &Shear, sides: Sides) -> Option<Meeting> {
+    pub fn meet(at: impl Fn(usize, usize) -> f32, frame: &Shear, sides: Sides) -> Option<Meeting> {
         let [kx, ky, kz] = frame.k;
         let [sx, sy, sz] = frame.shear;
-        let [a, b, c] = self.vertices.map(|p| {
-            let dz = f64::from(p[kz]) - frame.origin[kz];
-            let dx = f64::from(p[kx]) - frame.origin[kx];
-            let dy = f64::from(p[ky]) - frame.origin[ky];
+        let corner = |i: usize| {
+            let dz = f64::from(at(i, kz)) - frame.origin[2];
+            let dx = f64::from(at(i, kx)) - frame.origin[0];
+            let dy = f64::from(at(i, ky)) - frame.origin[1];
             [dx - sx * dz, dy - sy * dz, dz]
-        });
+        };
+        let (a, b, c) = (corner(0), corner(1), corner(2));
         // Edge functions: no fused operations, or the two triangles of an edge would differ.
         let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
         if of_both_signs(u, v, w) {
@@ -211,7 +215,7 @@ impl Primitive for Triangle {
 
     #[inline]
     fn intersect(&self, ray: &PreparedRay, sides: Sides) -> Option<Crossing> {
-        let Meeting { t, u, v } = self.meet(&ray.frame, sides)?;
+        let Meeting { t, u, v } = Self::meet(|i, axis| self.vertices[i][axis], &ray.frame, sides)?;
         let crossing = Crossing::in_range(ray, t)?;
         // Points on one line can enclose a ray only by rounding.
         (!self.is_degenerate()).then_some(Crossing { u, v, ..crossing })

@@ -1,6 +1,6 @@
 //! Leaf blocks: eight primitives a block, triangles as structure of arrays.
 
-use crate::primitive::{Sides, Triangle};
+use crate::primitive::Sides;
 
 /// Lanes of a block.
 pub const WIDTH: usize = 8;
@@ -39,16 +39,14 @@ impl Block {
     /// A block without primitives.
     pub const EMPTY: Block = Block { vertex: [[[f32::NAN; WIDTH]; 3]; 3], id: [NO_ID; WIDTH] };
 
-    /// The triangle of a lane, the sides on which it can be hit, and its primitive.
+    /// The sides on which the primitive of a lane can be hit.
     #[inline(always)]
-    pub fn triangle(&self, lane: usize) -> (Triangle, Sides, u32) {
-        let vertices = self.vertex.map(|rows| rows.map(|row| row[lane]));
-        let sides = match self.id[lane] & !ID_MASK {
+    pub fn sides(&self, lane: usize) -> Sides {
+        match self.id[lane] & !ID_MASK {
             SIDES_FRONT => Sides::Front,
             SIDES_BACK => Sides::Back,
             _ => Sides::Both,
-        };
-        (Triangle { vertices }, sides, self.id[lane] & ID_MASK)
+        }
     }
 
     /// The lanes that hold primitives other than triangles.
