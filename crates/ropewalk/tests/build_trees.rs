@@ -3,7 +3,8 @@
 
 use proptest::prelude::*;
 use ropewalk::build::{
-    BuildError, BuildReport, BuildSettings, Measure, Monitor, Termination, build, build_default,
+    BuildError, BuildReport, BuildSettings, Measure, Monitor, Preset, Termination, build,
+    build_default,
 };
 use ropewalk::cost::LeafCost;
 use ropewalk::primitive::{Primitive, Sphere, Triangle};
@@ -51,21 +52,25 @@ fn checked(geometry: &Geometry, settings: &BuildSettings) -> (BspTree, BuildRepo
     (tree, report)
 }
 
-/// All combinations of strategy, termination, clipping and late cutting.
+/// All combinations of strategy, termination, clipping and late cutting; and all presets.
 fn all_settings() -> impl Iterator<Item = BuildSettings> {
     let switches = [(false, false), (true, false), (false, true), (true, true)];
-    MEASURES.into_iter().flat_map(move |measure| {
+    let exact = MEASURES.map(|measure| (measure, usize::MAX));
+    let binned = [0, 8, 33].map(|from| (Measure::MacDonaldBooth, from));
+    let presets = Preset::ALL.map(BuildSettings::preset);
+    let combined = exact.into_iter().chain(binned).flat_map(move |(measure, binned_from)| {
         TERMINATIONS.into_iter().flat_map(move |termination| {
             switches.into_iter().map(move |(clipping, late_cutting)| BuildSettings {
                 measure,
+                binned_from,
                 termination,
                 clipping,
                 late_cutting,
-                threads: 1,
                 ..BuildSettings::default()
             })
         })
-    })
+    });
+    combined.chain(presets).map(|settings| BuildSettings { threads: 1, ..settings })
 }
 
 /// A coordinate over many magnitudes, or on a small integer grid where ties are exact.
@@ -161,6 +166,41 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
         assert!(one.0 == two.0 && one.0 == five.0, "{measure:?}");
         assert_eq!((one.1.stops, &one.1.tree), (five.1.stops, &five.1.tree));
     }
+}
+
+#[test]
+fn presets_do_not_depend_on_the_number_of_threads() {
+    let geometry = soup(40_000);
+    for preset in Preset::ALL {
+        let [one, two, five] = [1, 2, 5].map(|threads| {
+            let settings = BuildSettings { threads, ..BuildSettings::preset(preset) };
+            build(&geometry, &settings, &()).expect("settings in range")
+        });
+        assert!(one.1.tree.inner_nodes > 1000, "{preset:?}: too small to tell");
+        assert!(one.0 == two.0 && one.0 == five.0, "{preset:?}");
+        assert_eq!((one.1.stops, &one.1.tree), (five.1.stops, &five.1.tree));
+    }
+}
+
+#[test]
+fn binned_planes_predict_as_little_as_the_exact_sweep() {
+    let geometry = soup(5000);
+    let cost = |preset| {
+        let settings = BuildSettings { threads: 1, ..BuildSettings::preset(preset) };
+        let (tree, _) = checked(&geometry, &settings);
+        let mut cost = 0.0;
+        tree.for_each_node(|_, kind, cell, _| {
+            let node = match kind {
+                NodeKind::Inner { .. } => settings.traversal_cost,
+                NodeKind::Leaf { count, .. } => settings.leaf_cost.leaf(count as usize),
+            };
+            cost += node * cell.area() / tree.bounds().area();
+        });
+        cost
+    };
+    let [fast, balanced, best] = Preset::ALL.map(cost);
+    assert!(balanced < 1.03 * best, "{balanced} {best}");
+    assert!(balanced < fast, "clipping pays: {balanced} {fast}");
 }
 
 #[test]

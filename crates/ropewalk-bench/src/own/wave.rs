@@ -5,8 +5,7 @@ use crate::answer::{BenchHit, HitLists};
 use crate::harness::{Builder, Built, Clock, Engine, Family};
 use crate::scene::Mesh;
 use crate::workload::Question;
-use ropewalk::build::{BuildSettings, build};
-use ropewalk::cost::LeafCost;
+use ropewalk::build::{BuildSettings, Preset, build};
 use ropewalk::kernel::BatchCaster;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray};
@@ -17,16 +16,9 @@ pub struct Wave {
     tree: WideTree,
 }
 
-/// The settings of the wide tree: leaves cost their blocks of eight, a step of three levels costs
-/// about as much as a block.
+/// The default preset of the wide tree.
 pub fn settings(threads: usize) -> BuildSettings {
-    BuildSettings {
-        leaf_cost: LeafCost::Blocks { width: 8 },
-        traversal_cost: 0.3,
-        late_cutting: false,
-        threads,
-        ..BuildSettings::default()
-    }
+    BuildSettings { threads, ..BuildSettings::preset(Preset::Balanced) }
 }
 
 impl Wave {

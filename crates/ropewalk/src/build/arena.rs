@@ -39,11 +39,17 @@ impl Clipper<'_> {
     fn clip(&self, fragment: &Fragment, cell: &Aabb) -> Option<Fragment> {
         let bounds = if self.clipping {
             // The intersection holds a foreign primitive to its contract.
-            self.geometry.shape(fragment.prim).clipped_bounds(cell)?.intersection(cell)
+            self.geometry.shape(fragment.prim()).clipped_bounds(cell)?.intersection(cell)
         } else {
             fragment.bounds().intersection(cell)
         };
-        (!bounds.is_empty()).then(|| Fragment::new(fragment.prim, &bounds))
+        (!bounds.is_empty()).then(|| Fragment::new(fragment.prim(), &bounds))
+    }
+
+    /// Clips a fragment where it lies; true if nothing is left of it.
+    fn clip_away(&self, fragment: &mut Fragment, cell: &Aabb) -> bool {
+        *fragment = self.clip(fragment, cell).unwrap_or_else(Fragment::gone);
+        fragment.is_gone()
     }
 }
 
@@ -53,6 +59,8 @@ pub(crate) struct SplitBuffers {
     /// For each fragment of the parent: its number in the child and the child (see `Target`).
     targets: Vec<Target>,
     left_fragments: Vec<Fragment>,
+    /// Where the two parts of straddlers lie, without events.
+    straddlers: Vec<(u32, u32)>,
     left_events: Vec<Event>,
     /// Events of the parts of straddlers, per axis.
     new_left: [Vec<Event>; 3],
@@ -154,8 +162,11 @@ impl Arena {
         buffers: &mut SplitBuffers,
     ) -> (NodeSize, NodeSize) {
         let with_events = size.events != [0; 3];
-        let (left, right) =
-            self.split_fragments(size.fragments, plane, cells, clipper, buffers, with_events);
+        let (left, right) = if with_events {
+            self.split_fragments(size.fragments, plane, cells, clipper, buffers)
+        } else {
+            self.split_alone(size.fragments, plane, cells, clipper, buffers)
+        };
         let mut sizes = (
             NodeSize { fragments: left, events: [0; 3] },
             NodeSize { fragments: right, events: [0; 3] },
@@ -178,7 +189,6 @@ impl Arena {
         cells: &(Aabb, Aabb),
         clipper: Clipper<'_>,
         buffers: &mut SplitBuffers,
-        with_events: bool,
     ) -> (usize, usize) {
         let base = self.fragments.len() - count;
         let own = &mut self.fragments[base..];
@@ -201,17 +211,13 @@ impl Arena {
                 }
                 Side::Both => {
                     if let Some(part) = clipper.clip(&f, &cells.0) {
-                        if with_events {
-                            let id = left.len() as u32;
-                            (0..3).for_each(|a| part.push_events(id, a, &mut new_left[a]));
-                        }
+                        let id = left.len() as u32;
+                        (0..3).for_each(|a| part.push_events(id, a, &mut new_left[a]));
                         left.push(part);
                     }
                     if let Some(part) = clipper.clip(&f, &cells.1) {
-                        if with_events {
-                            let id = rights as u32;
-                            (0..3).for_each(|a| part.push_events(id, a, &mut new_right[a]));
-                        }
+                        let id = rights as u32;
+                        (0..3).for_each(|a| part.push_events(id, a, &mut new_right[a]));
                         own[rights] = part;
                         rights += 1;
                     }
@@ -222,6 +228,68 @@ impl Arena {
         self.fragments.truncate(base + rights);
         self.fragments.extend_from_slice(left);
         (left.len(), rights)
+    }
+
+    /// Sends the fragments on top, which have no events, to the children.
+    fn split_alone(
+        &mut self,
+        count: usize,
+        plane: &Plane,
+        cells: &(Aabb, Aabb),
+        clipper: Clipper<'_>,
+        buffers: &mut SplitBuffers,
+    ) -> (usize, usize) {
+        let base = self.fragments.len() - count;
+        let SplitBuffers { left_fragments, straddlers, .. } = buffers;
+        if left_fragments.len() < count {
+            left_fragments.resize(count, Fragment::default());
+            straddlers.resize(count, (0, 0));
+        }
+        let own = &mut self.fragments[base..];
+        let (lefts, straddlers) = (&mut left_fragments[..count], &mut straddlers[..count]);
+        let (axis, position) = (plane.axis, plane.position);
+        // Both writes are unconditional and only the counters depend on the side: a branch here
+        // would be taken at random.
+        let (mut l, mut r, mut both) = (0, 0, 0);
+        for i in 0..count {
+            let f = own[i];
+            let (lo, hi) = (f.min(axis), f.max(axis));
+            let planar = lo == hi && lo == position;
+            let goes_left = lo < position || planar && plane.planar_left;
+            let goes_right = hi > position || planar && !plane.planar_left;
+            lefts[l] = f; // l <= i < count
+            own[r] = f; // r <= i: read already
+            straddlers[both] = (l as u32, r as u32);
+            l += usize::from(goes_left);
+            r += usize::from(goes_right);
+            both += usize::from(goes_left && goes_right);
+        }
+        let mut gone = (0, 0);
+        for &(at_left, at_right) in &straddlers[..both] {
+            let (left, right) = (&mut lefts[at_left as usize], &mut own[at_right as usize]);
+            gone.0 += usize::from(clipper.clip_away(left, &cells.0));
+            gone.1 += usize::from(clipper.clip_away(right, &cells.1));
+        }
+        self.fragments.truncate(base + r);
+        self.fragments.extend_from_slice(&lefts[..l]);
+        let (l, r) = (l - gone.0, r - gone.1);
+        if gone != (0, 0) {
+            self.sweep_out(base);
+        }
+        debug_assert_eq!(self.fragments.len(), base + l + r);
+        (l, r)
+    }
+
+    /// Removes the fragments from `base` on that turned out to be empty.
+    #[cold]
+    fn sweep_out(&mut self, base: usize) {
+        let mut kept = base;
+        for i in base..self.fragments.len() {
+            let f = self.fragments[i];
+            self.fragments[kept] = f;
+            kept += usize::from(!f.is_gone());
+        }
+        self.fragments.truncate(kept);
     }
 
     /// Sends the sorted events on top to the children and merges in those of the straddlers.

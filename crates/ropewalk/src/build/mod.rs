@@ -22,7 +22,7 @@ pub use blockage::EstimatorStats;
 pub use error::BuildError;
 pub use monitor::Monitor;
 pub use report::{BuildReport, StopCounts};
-pub use settings::{BuildSettings, Measure, Termination, TerminationEstimator};
+pub use settings::{BuildSettings, Measure, Preset, Termination, TerminationEstimator};
 
 use crate::cost;
 use crate::geometry::Geometry;
@@ -32,7 +32,7 @@ use arena::Clipper;
 use blockage::{Blockage, estimator_stats};
 use fragment::Fragment;
 use plane::Pricing;
-use search::{MacDonaldBooth1990, ObjectMedian, PlaneSearch, SpatialMedian, Sweep};
+use search::{Binned, MacDonaldBooth1990, ObjectMedian, PlaneSearch, SpatialMedian, Sweep};
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
 use stopping::Stopping;
@@ -149,7 +149,7 @@ fn build_output(
         traversal_cost: settings.traversal_cost,
         empty_factor: settings.empty_factor,
     };
-    let search = plane_search(settings.measure, pricing, blockage);
+    let search = plane_search(settings, pricing, blockage);
     let fragments: Vec<Fragment> = (0..geometry.len() as u32)
         .map(|prim| Fragment::new(prim, &geometry.shape(prim).bounds()))
         .collect();
@@ -168,16 +168,20 @@ fn build_output(
 }
 
 fn plane_search<'a>(
-    measure: Measure,
+    settings: &BuildSettings,
     pricing: Pricing,
     blockage: Option<&'a Blockage<'a>>,
 ) -> Box<dyn PlaneSearch + 'a> {
-    match measure {
+    match settings.measure {
         Measure::SpatialMedian => Box::new(SpatialMedian { pricing }),
         Measure::ObjectMedian => Box::new(ObjectMedian { pricing }),
         Measure::MacDonaldBooth1990 => Box::new(MacDonaldBooth1990 { pricing }),
         Measure::MacDonaldBooth => {
-            Box::new(Sweep { model: cost::MacDonaldBooth, pricing, blockage: None })
+            let exact = Sweep { model: cost::MacDonaldBooth, pricing, blockage: None };
+            match settings.binned_from {
+                usize::MAX => Box::new(exact),
+                from => Box::new(Binned { exact, from }),
+            }
         }
         Measure::HavranPrinted => Box::new(Sweep { model: cost::HavranPrinted, pricing, blockage }),
         Measure::HavranPrintedCrossed => {

@@ -31,7 +31,7 @@ impl Plane {
     /// Which side a fragment belongs to. A fragment that only touches the plane stays on its side.
     #[inline]
     pub fn side_of(&self, fragment: &Fragment) -> Side {
-        let (lo, hi) = (fragment.min[self.axis], fragment.max[self.axis]);
+        let (lo, hi) = (fragment.min(self.axis), fragment.max(self.axis));
         if lo == hi && lo == self.position {
             if self.planar_left { Side::Left } else { Side::Right }
         } else if hi <= self.position {
@@ -57,7 +57,7 @@ impl Counts {
     pub fn of(fragments: &[Fragment], axis: usize, position: f32) -> Self {
         let mut counts = Counts::default();
         for f in fragments {
-            let (lo, hi) = (f.min[axis], f.max[axis]);
+            let (lo, hi) = (f.min(axis), f.max(axis));
             counts.left += usize::from(lo < position);
             counts.planar += usize::from(lo == position && hi == position);
             counts.right += usize::from(hi > position);
@@ -106,6 +106,11 @@ impl CellAreas {
         Some(CellAreas { lo, hi, caps, rim, area: caps + rim * cell.extent(axis) })
     }
 
+    /// The cell's extent along the axis.
+    pub fn range(&self) -> (f32, f32) {
+        (self.lo, self.hi)
+    }
+
     /// Distance of a plane from the lower face.
     #[inline]
     pub fn local(&self, position: f32) -> f64 {
@@ -150,6 +155,12 @@ pub(crate) struct Pricing {
 }
 
 impl Pricing {
+    /// Price of one more unit of leaf cost below a node, in units of the node's cost.
+    #[inline]
+    pub fn size_price(&self, _areas: &CellAreas) -> f64 {
+        0.0
+    }
+
     /// `traversal_cost + measure`, the measure times `empty_factor` if a side is empty.
     #[inline]
     pub fn price<M: CostModel>(

@@ -104,6 +104,32 @@ pub enum Termination {
     },
 }
 
+/// How a build for the wide tree trades its own time against the rays'.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Preset {
+    /// Binned planes everywhere, boxes cut instead of primitives: for geometry that changes.
+    Fast,
+    /// Binned planes in large nodes, the exact sweep in small ones, primitives clipped.
+    #[default]
+    Balanced,
+    /// The exact sweep everywhere.
+    Best,
+}
+
+impl Preset {
+    /// All presets, fastest first.
+    pub const ALL: [Preset; 3] = [Preset::Fast, Preset::Balanced, Preset::Best];
+
+    /// The name used on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Preset::Fast => "fast",
+            Preset::Balanced => "balanced",
+            Preset::Best => "best",
+        }
+    }
+}
+
 /// Everything that steers a build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildSettings {
@@ -127,6 +153,10 @@ pub struct BuildSettings {
     /// build stops splitting what would exceed it. Shared out over the children in proportion to
     /// their counts, so that the tree does not depend on the number of threads.
     pub max_duplication: f64,
+    /// Nodes with at least so many references look for their plane in bins (Shevtsov, Soupikov and
+    /// Kapustin 2007) instead of sweeping over all of them; `usize::MAX` is the exact sweep
+    /// everywhere. Read by [`Measure::MacDonaldBooth`] alone.
+    pub binned_from: usize,
     /// Threads; 0 is one per core. The tree is the same for any number.
     pub threads: usize,
 }
@@ -143,12 +173,31 @@ impl Default for BuildSettings {
             late_cutting: true,
             clipping: true,
             max_duplication: 32.0,
+            binned_from: usize::MAX,
             threads: 0,
         }
     }
 }
 
 impl BuildSettings {
+    /// The settings for a tree that is compiled to a [`WideTree`](crate::wide::WideTree): leaves
+    /// cost their blocks of eight, and a step of three levels costs about as much as a block.
+    pub fn preset(preset: Preset) -> Self {
+        let (binned_from, clipping) = match preset {
+            Preset::Fast => (0, false),
+            Preset::Balanced => (33, true),
+            Preset::Best => (usize::MAX, true),
+        };
+        BuildSettings {
+            leaf_cost: LeafCost::Blocks { width: 8 },
+            traversal_cost: 0.3,
+            late_cutting: false,
+            clipping,
+            binned_from,
+            ..BuildSettings::default()
+        }
+    }
+
     /// The settings in effect, checked: the 1990 measure never clips.
     ///
     /// # Errors

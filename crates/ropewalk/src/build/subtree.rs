@@ -228,7 +228,7 @@ impl<'a> Worker<'a> {
                 self.out.push_leaf(std::iter::empty())?;
             }
         }
-        self.out.push_leaf(fragments.iter().map(|f| f.prim))?;
+        self.out.push_leaf(fragments.iter().map(|f| f.prim()))?;
         for (index, slab) in pending.into_iter().rev() {
             let right = self.out.next_node()?;
             self.out.nodes[index as usize] = Node::inner(slab.axis, slab.position, right);

@@ -3,7 +3,7 @@
 use crate::bench::{Bench, coordinates};
 use crate::scenes;
 use ropewalk::Geometry;
-use ropewalk::build::{BuildSettings, Measure, Termination, build};
+use ropewalk::build::{BuildSettings, Measure, Preset, Termination, build};
 use ropewalk_testkit::rays::{Draw, aligned_ray, generic_ray, grid_ray};
 use std::sync::Arc;
 
@@ -27,9 +27,8 @@ fn settings(measure: Measure, draw: &mut Draw) -> BuildSettings {
     }
 }
 
-fn check(measure: Measure, geometry: Geometry, draw: &mut Draw) {
-    let settings = settings(measure, draw);
-    let (tree, _) = build(&geometry, &settings, &()).unwrap();
+fn check(settings: &BuildSettings, geometry: Geometry, draw: &mut Draw) {
+    let (tree, _) = build(&geometry, settings, &()).unwrap();
     let bench = Bench::new(Arc::new(geometry), Arc::new(tree));
     for accelerator in &bench.walks {
         if let Some(ropes) = accelerator.ropes() {
@@ -53,20 +52,41 @@ fn every_measure() {
         for repeat in 0..3 {
             let mut draw = Draw::new(1000 + 10 * round as u64 + repeat);
             let draw = &mut draw;
-            let scenes = [
-                scenes::soup(draw, 200, 1.0),
-                scenes::exponent_soup(draw, 100, -8.0, 8.0),
-                scenes::mixed(draw, 150, false),
-                scenes::mixed(draw, 80, true),
-                scenes::grid_soup(draw, 120, 4),
-                scenes::grid_quads(draw, 80, 4),
-                scenes::flat(draw, 40, round % 3),
-                scenes::offset(&scenes::grid_soup(draw, 100, 4), [1e6, 0.0, -1e6]),
-                Geometry::new(),
-            ];
-            for geometry in scenes {
-                check(measure, geometry, draw);
+            for geometry in all_scenes(draw, round % 3) {
+                let settings = settings(measure, draw);
+                check(&settings, geometry, draw);
             }
         }
     }
+}
+
+#[test]
+fn binned_planes_and_presets() {
+    for round in 0..4 {
+        let mut draw = Draw::new(2000 + round);
+        let draw = &mut draw;
+        for geometry in all_scenes(draw, round as usize % 3) {
+            let binned_from = [0, 8, 33][draw.below(3)];
+            let settings = BuildSettings { binned_from, ..settings(Measure::MacDonaldBooth, draw) };
+            check(&settings, geometry.clone(), draw);
+            let preset = Preset::ALL[draw.below(3)];
+            let settings = BuildSettings { threads: 1, ..BuildSettings::preset(preset) };
+            check(&settings, geometry, draw);
+        }
+    }
+}
+
+/// One scene of each kind; the flat one is perpendicular to `axis`.
+fn all_scenes(draw: &mut Draw, axis: usize) -> [Geometry; 9] {
+    [
+        scenes::soup(draw, 200, 1.0),
+        scenes::exponent_soup(draw, 100, -8.0, 8.0),
+        scenes::mixed(draw, 150, false),
+        scenes::mixed(draw, 80, true),
+        scenes::grid_soup(draw, 120, 4),
+        scenes::grid_quads(draw, 80, 4),
+        scenes::flat(draw, 40, axis),
+        scenes::offset(&scenes::grid_soup(draw, 100, 4), [1e6, 0.0, -1e6]),
+        Geometry::new(),
+    ]
 }

@@ -1,10 +1,13 @@
 //! Plane searches: which cutting plane is best for a node. One file a strategy.
 
+mod binned;
 mod macdonald_booth_1990;
 mod object_median;
 mod spatial_median;
 mod sweep;
+mod tally;
 
+pub(super) use binned::Binned;
 pub(super) use macdonald_booth_1990::MacDonaldBooth1990;
 pub(super) use object_median::ObjectMedian;
 pub(super) use spatial_median::SpatialMedian;
@@ -18,6 +21,7 @@ use crate::cost::MacDonaldBooth;
 use crate::primitive::AreaRamp;
 
 /// What a search may look at.
+#[derive(Clone, Copy)]
 pub(crate) struct NodeView<'a> {
     pub cell: Aabb,
     pub depth: usize,
@@ -31,6 +35,8 @@ pub(crate) struct NodeView<'a> {
 pub(crate) struct SearchBuffers {
     centroids: Vec<f32>,
     ramps: Vec<AreaRamp>,
+    events: [Vec<Event>; 3],
+    candidates: binned::Candidates,
 }
 
 /// A strategy.
@@ -51,10 +57,26 @@ fn direct_plane(
     pricing: &Pricing,
 ) -> Option<Plane> {
     let counts = Counts::of(node.fragments, axis, position);
+    priced_plane(areas, axis, position, counts, node.fragments.len(), pricing)
+}
+
+/// The same where the counts are known.
+#[inline]
+fn priced_plane(
+    areas: &CellAreas,
+    axis: usize,
+    position: f32,
+    counts: Counts,
+    total: usize,
+    pricing: &Pricing,
+) -> Option<Plane> {
     let mut best: Option<Plane> = None;
     for planar_left in [true, false] {
+        if !planar_left && counts.planar == 0 {
+            break;
+        }
         let (left, right) = counts.children(planar_left);
-        if !areas.makes_progress(position, left, right, node.fragments.len()) {
+        if !areas.makes_progress(position, left, right, total) {
             continue;
         }
         let cost = pricing.price(&MacDonaldBooth, areas, position, (left, right), (0.0, 0.0));

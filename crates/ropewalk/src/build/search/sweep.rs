@@ -100,7 +100,7 @@ impl<M: CostModel> Sweep<'_, M> {
         best: &mut Shortlist,
     ) {
         let ramps = &mut buffers.ramps;
-        let prims = node.fragments.iter().map(|f| f.prim);
+        let prims = node.fragments.iter().map(|f| f.prim());
         blockage.collect_ramps(prims, &node.cell, axis, ramps);
         let total = AreaSweep::total(ramps, node.cell.extent(axis));
         let mut sweep = AreaSweep::new(ramps);

@@ -21,7 +21,7 @@ fn fragments(geometry: &Geometry) -> Vec<Fragment> {
 /// The area below a plane by summing each ramp's definition.
 fn direct_area(blockage: &Blockage<'_>, node: &NodeView<'_>, axis: usize, x: f64) -> (f64, f64) {
     let mut ramps = Vec::new();
-    blockage.collect_ramps(node.fragments.iter().map(|f| f.prim), &node.cell, axis, &mut ramps);
+    blockage.collect_ramps(node.fragments.iter().map(|f| f.prim()), &node.cell, axis, &mut ramps);
     let (mut below, mut in_plane) = (0.0, 0.0);
     for r in &ramps {
         let d = x - r.x;
@@ -40,7 +40,7 @@ fn brute_force<M: CostModel>(search: &Sweep<'_, M>, node: &NodeView<'_>) -> Opti
     let count = node.fragments.len();
     for axis in 0..3 {
         let Some(areas) = CellAreas::new(&node.cell, axis) else { continue };
-        for position in node.fragments.iter().flat_map(|f| [f.min[axis], f.max[axis]]) {
+        for position in node.fragments.iter().flat_map(|f| [f.min(axis), f.max(axis)]) {
             let counts = Counts::of(node.fragments, axis, position);
             for planar_left in [true, false] {
                 let (left, right) = counts.children(planar_left);

@@ -1,0 +1,388 @@
+//! Planes from samples of the measure (after Shevtsov, Soupikov and Kapustin 2007), settled at
+//! exact positions.
+
+use super::tally::{AxisMeasure, Best, LANES, Lanes, Tally, block_width};
+use super::{NodeView, PlaneSearch, SearchBuffers, Sweep, priced_plane};
+use crate::build::fragment::Fragment;
+use crate::build::plane::{CellAreas, Counts, Plane, Pricing};
+use crate::cost::MacDonaldBooth;
+
+/// Extents within which positions can be spread in `f32`.
+const SPREADABLE: std::ops::Range<f32> = 1e-30..1e30;
+
+/// Candidates that are counted one by one.
+const MAX_CANDIDATES: usize = 128;
+
+/// Times that the interval around the best sample is sampled again.
+const ZOOMS: usize = 3;
+
+/// The measure of MacDonald and Booth, minimised without sorting. In a large node all three axes are
+/// sampled at [`LANES`] positions; around the cheapest one the axis is sampled again, until few
+/// enough starts and ends of fragments are left to try them all. In a small node all starts and ends
+/// are tried at once, which is the exact minimum.
+///
+/// What is returned has true counts and lies at a start or end of a fragment; what may be missed in
+/// a large node is a cheaper plane between samples that look dear.
+///
+/// Deviation: the paper counts starts and ends in bins and adds up the bins; comparing with all
+/// positions at once costs as much and gives the counts themselves.
+pub(crate) struct Binned {
+    pub exact: Sweep<'static, MacDonaldBooth>,
+    /// Nodes with fewer fragments are searched exactly.
+    pub from: usize,
+}
+
+impl PlaneSearch for Binned {
+    fn uses_events(&self) -> bool {
+        false
+    }
+
+    fn best_plane(&self, node: &NodeView<'_>, buffers: &mut SearchBuffers) -> Option<Plane> {
+        let pricing = &self.exact.pricing;
+        let count = node.fragments.len();
+        let tight = Tight::of(node.fragments);
+        let areas = std::array::from_fn(|axis| CellAreas::new(&node.cell, axis));
+        let face = tight.best_face(node, &areas, pricing);
+        // Where no set is cheaper than the whole, only cutting off empty space can pay.
+        if pricing.leaf_cost.cost(1) == pricing.leaf_cost.cost(count) {
+            return face;
+        }
+        let width = block_width(pricing.leaf_cost).filter(|_| tight.is_spreadable());
+        let Some(width) = width else { return self.swept(node, buffers) };
+        let measures = std::array::from_fn(|axis| {
+            let areas = areas[axis].as_ref().filter(|_| tight.min[axis] < tight.max[axis]);
+            areas.map(|a| AxisMeasure::new(a, axis, count, width, pricing))
+        });
+        let inner = if 2 * count <= MAX_CANDIDATES && count < self.from {
+            tight.best_of_all(node, &measures, &mut buffers.candidates)
+        } else {
+            tight.best_of_bins(node, &measures, &mut buffers.candidates)
+        };
+        match (face, inner.plane(&areas, pricing)) {
+            (Some(face), Some(inner)) => Some(if inner.cost < face.cost { inner } else { face }),
+            (face, inner) => face.or(inner),
+        }
+    }
+}
+
+impl Binned {
+    /// The exact sweep over events that are made and sorted for this node alone.
+    fn swept(&self, node: &NodeView<'_>, buffers: &mut SearchBuffers) -> Option<Plane> {
+        let mut events = std::mem::take(&mut buffers.events);
+        for (axis, events) in events.iter_mut().enumerate() {
+            events.clear();
+            for (id, fragment) in node.fragments.iter().enumerate() {
+                fragment.push_events(id as u32, axis, events);
+            }
+            events.sort_unstable();
+        }
+        let view = NodeView { events: [&events[0], &events[1], &events[2]], ..*node };
+        let plane = self.exact.best_plane(&view, buffers);
+        buffers.events = events;
+        plane
+    }
+}
+
+/// Measures of the three axes, where something can be cut.
+type Measures = [Option<AxisMeasure>; 3];
+
+/// Positions to be tried, in full tallies.
+pub(crate) struct Candidates {
+    positions: [f32; MAX_CANDIDATES + LANES],
+    len: usize,
+}
+
+impl Default for Candidates {
+    fn default() -> Self {
+        Candidates { positions: [0.0; MAX_CANDIDATES + LANES], len: 0 }
+    }
+}
+
+impl Candidates {
+    /// Collects all starts and ends above `min` and up to `max`; false if there are too many.
+    #[inline]
+    fn collect(&mut self, fragments: &[Fragment], axis: usize, (min, max): (f32, f32)) -> bool {
+        let mut len = 0;
+        for f in fragments {
+            if len + 2 > MAX_CANDIDATES {
+                return false;
+            }
+            for x in [f.min(axis), f.max(axis)] {
+                // Written always, kept only inside: cheaper than a branch.
+                self.positions[len] = x;
+                len += usize::from(min < x && x <= max);
+            }
+        }
+        self.len = len.next_multiple_of(LANES);
+        if len > 0 {
+            let last = self.positions[len - 1];
+            self.positions[len..self.len].fill(last);
+        }
+        true
+    }
+
+    /// These few alone.
+    fn set(&mut self, positions: &[f32]) {
+        self.len = if positions.is_empty() { 0 } else { LANES };
+        for (place, &position) in
+            self.positions[..self.len].iter_mut().zip(positions.iter().cycle())
+        {
+            *place = position;
+        }
+    }
+
+    /// Counts and offers all of them.
+    #[inline]
+    fn offer(&self, fragments: &[Fragment], axis: usize, measure: &AxisMeasure, best: &mut Best) {
+        for positions in self.positions[..self.len].as_chunks::<LANES>().0 {
+            best.offer(measure, positions, &Tally::of(fragments, axis, positions));
+        }
+    }
+}
+
+/// The box around all fragments of a node.
+struct Tight {
+    min: [f32; 3],
+    max: [f32; 3],
+}
+
+impl Tight {
+    fn of(fragments: &[Fragment]) -> Self {
+        let (mut min, mut max) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+        for f in fragments {
+            for i in 0..8 {
+                min[i] = if f.lanes[i] < min[i] { f.lanes[i] } else { min[i] };
+                max[i] = if f.lanes[i] > max[i] { f.lanes[i] } else { max[i] };
+            }
+        }
+        Tight { min: [min[0], min[1], min[2]], max: [max[4], max[5], max[6]] }
+    }
+
+    /// The range of positions strictly inside the box: above the first and up to the second.
+    fn inside(&self, axis: usize) -> (f32, f32) {
+        (self.min[axis], self.max[axis].next_down())
+    }
+
+    /// True if positions can be spread over the box in `f32`.
+    fn is_spreadable(&self) -> bool {
+        (0..3).all(|a| {
+            let extent = self.max[a] - self.min[a];
+            extent == 0.0 || SPREADABLE.contains(&extent)
+        })
+    }
+
+    /// The cheapest plane through a face of the box: it leaves one side empty, or filled by what
+    /// lies in the face.
+    fn best_face(
+        &self,
+        node: &NodeView<'_>,
+        areas: &[Option<CellAreas>; 3],
+        pricing: &Pricing,
+    ) -> Option<Plane> {
+        // Negative and positive lanes of the faces: a fragment lies in a lower face if it ends
+        // there, and in an upper one if it starts there.
+        let count = node.fragments.len();
+        let (mut in_min, mut in_max) = ([0.0f32; 4], [0.0f32; 4]);
+        let [x0, y0, z0] = self.min;
+        let [x1, y1, z1] = self.max;
+        let (min, max) = ([x0, y0, z0, 0.0], [x1, y1, z1, 0.0]);
+        for f in node.fragments {
+            for i in 0..4 {
+                in_min[i] += if f.lanes[4 + i] <= min[i] { 1.0 } else { 0.0 };
+                in_max[i] += if f.lanes[i] >= max[i] { 1.0 } else { 0.0 };
+            }
+        }
+        let mut best: Option<Plane> = None;
+        for axis in 0..3 {
+            let Some(areas) = &areas[axis] else { continue };
+            let mut offer = |position, counts| {
+                let plane = priced_plane(areas, axis, position, counts, count, pricing);
+                if plane.is_some_and(|p| best.is_none_or(|b| p.cost < b.cost)) {
+                    best = plane;
+                }
+            };
+            let planar = in_min[axis] as usize;
+            offer(self.min[axis], Counts { left: 0, planar, right: count - planar });
+            if self.max[axis] > self.min[axis] {
+                let planar = in_max[axis] as usize;
+                offer(self.max[axis], Counts { left: count - planar, planar, right: 0 });
+            }
+        }
+        best
+    }
+
+    /// The cheapest of all starts and ends strictly inside the box.
+    fn best_of_all(
+        &self,
+        node: &NodeView<'_>,
+        measures: &Measures,
+        candidates: &mut Candidates,
+    ) -> Best {
+        let mut best = Best::NONE;
+        for (axis, measure) in measures.iter().enumerate() {
+            let Some(measure) = measure else { continue };
+            candidates.collect(node.fragments, axis, self.inside(axis));
+            candidates.offer(node.fragments, axis, measure, &mut best);
+        }
+        best
+    }
+
+    /// The cheapest start or end beside the cheapest boundaries of bins.
+    fn best_of_bins(
+        &self,
+        node: &NodeView<'_>,
+        measures: &Measures,
+        candidates: &mut Candidates,
+    ) -> Best {
+        let bins = Bins::of(node.fragments, self);
+        let mut boundaries: [Option<Boundary>; 3] = std::array::from_fn(|axis| {
+            measures[axis].as_ref().and_then(|m| bins.best_boundary(axis, m, node.fragments.len()))
+        });
+        boundaries.sort_by(|a, b| match (a, b) {
+            (Some(a), Some(b)) => a.measure.total_cmp(&b.measure),
+            (a, b) => b.is_some().cmp(&a.is_some()),
+        });
+        let mut best = Best::NONE;
+        for Boundary { axis, bin, measure: sampled } in boundaries.into_iter().flatten() {
+            let Some(measure) = &measures[axis] else { continue };
+            if sampled >= best.lowest() {
+                break;
+            }
+            let edges = (bins.edge(axis, bin - 1), bins.edge(axis, bin + 1));
+            let ranges = (edges, self.inside(axis));
+            search_interval(node.fragments, axis, ranges, measure, candidates, &mut best);
+        }
+        best
+    }
+}
+
+/// Bins on each axis.
+const BINS: usize = 32;
+
+/// How many fragments start and end in each bin of each axis. Bin `b` holds what rounds to `b`, so
+/// that the outermost ones are half as wide.
+struct Bins {
+    starts: [[u32; BINS]; 3],
+    ends: [[u32; BINS]; 3],
+    origin: [f32; 4],
+    /// Bins per unit; 0 on an axis without extent.
+    scale: [f32; 4],
+}
+
+/// The lower edge of a bin, and what a plane there costs.
+struct Boundary {
+    axis: usize,
+    bin: usize,
+    measure: f32,
+}
+
+/// Adding it rounds a number of `0 ..= 2^22` to an integer that stands in the low bits.
+const ROUNDING: f32 = (1u32 << 23) as f32;
+
+impl Bins {
+    fn of(fragments: &[Fragment], tight: &Tight) -> Self {
+        let (mut origin, mut scale) = ([0.0; 4], [0.0; 4]);
+        for axis in 0..3 {
+            let extent = tight.max[axis] - tight.min[axis];
+            origin[axis] = tight.min[axis];
+            scale[axis] = if extent > 0.0 { (BINS - 1) as f32 / extent } else { 0.0 };
+        }
+        let mut bins = Bins { starts: [[0; BINS]; 3], ends: [[0; BINS]; 3], origin, scale };
+        for f in fragments {
+            let bin: [u32; 8] = std::array::from_fn(|i| {
+                ((f.lanes[i] - origin[i & 3]) * scale[i & 3] + ROUNDING).to_bits()
+            });
+            for axis in 0..3 {
+                bins.starts[axis][bin[axis] as usize & (BINS - 1)] += 1;
+                bins.ends[axis][bin[4 + axis] as usize & (BINS - 1)] += 1;
+            }
+        }
+        bins
+    }
+
+    /// Where bin `b` begins, up to rounding.
+    fn edge(&self, axis: usize, b: usize) -> f32 {
+        self.origin[axis] + (b as f32 - 0.5) / self.scale[axis]
+    }
+
+    /// The cheapest boundary between two bins.
+    fn best_boundary(&self, axis: usize, measure: &AxisMeasure, count: usize) -> Option<Boundary> {
+        let mut samples = Best::NONE;
+        let (mut left, mut right) = (0, count as u32);
+        let (origin, step) = (self.origin[axis] - 0.5 / self.scale[axis], 1.0 / self.scale[axis]);
+        for half in 0..BINS / LANES {
+            let mut tally = Tally::ZERO;
+            let mut positions = [0.0; LANES];
+            for c in 0..LANES {
+                let bin = half * LANES + c;
+                tally.left[c] = left as f32;
+                tally.right[c] = right as f32;
+                positions[c] = origin + bin as f32 * step;
+                left += self.starts[axis][bin];
+                right -= self.ends[axis][bin];
+            }
+            samples.offer(measure, &positions, &tally);
+        }
+        let (position, measure) = samples.cheapest()?;
+        let bin = ((position - origin) * self.scale[axis]).round() as usize;
+        Some(Boundary { axis, bin: bin.clamp(1, BINS - 1), measure })
+    }
+}
+
+/// Offers the starts and ends in an interval; where they are many, those around its cheapest part.
+fn search_interval(
+    fragments: &[Fragment],
+    axis: usize,
+    (mut interval, inside): ((f32, f32), (f32, f32)),
+    measure: &AxisMeasure,
+    candidates: &mut Candidates,
+    best: &mut Best,
+) {
+    interval = (interval.0.max(inside.0), interval.1.min(inside.1));
+    let mut found = candidates.collect(fragments, axis, interval);
+    for _ in 0..ZOOMS {
+        if found {
+            break;
+        }
+        let positions = spread(interval);
+        let tally = Tally::of(fragments, axis, &positions);
+        let mut samples = Best::NONE;
+        samples.offer(measure, &positions, &tally);
+        let Some((position, _)) = samples.cheapest() else { break };
+        let step = (interval.1 - interval.0) / LANES as f32;
+        interval = ((position - step).max(interval.0), (position + step).min(interval.1));
+        found = candidates.collect(fragments, axis, interval);
+    }
+    if !found || candidates.len == 0 {
+        let middle = 0.5 * (interval.0 + interval.1);
+        candidates.set(&beside(fragments, axis, (middle, middle), inside));
+    }
+    candidates.offer(fragments, axis, measure, best);
+}
+
+/// Evenly spaced positions in a range; the last one is its end.
+fn spread((min, max): (f32, f32)) -> Lanes {
+    let step = (max - min) / LANES as f32;
+    std::array::from_fn(|c| if c == LANES - 1 { max } else { min + (c + 1) as f32 * step })
+}
+
+/// The last start or end at or below an interval and the first one above it, where they lie inside
+/// the box.
+fn beside(
+    fragments: &[Fragment],
+    axis: usize,
+    interval: (f32, f32),
+    inside: (f32, f32),
+) -> Vec<f32> {
+    let (mut below, mut above) = (f32::NEG_INFINITY, f32::INFINITY);
+    for f in fragments {
+        for x in [f.min(axis), f.max(axis)] {
+            below = if x <= interval.0 && x > below { x } else { below };
+            above = if x > interval.1 && x < above { x } else { above };
+        }
+    }
+    [below, above].into_iter().filter(|&x| inside.0 < x && x <= inside.1).collect()
+}
+
+#[cfg(test)]
+mod tests;
