@@ -126,10 +126,11 @@ fn half_spaces(cell: &Extent) -> impl Iterator<Item = HalfSpace> {
     })
 }
 
-/// A convex loop of few vertices on the stack.
+/// A convex loop of few vertices on the stack. Points have a fourth coordinate, 0, so that each
+/// fills a SIMD register.
 pub(super) struct SmallLoop {
     /// Two buffers, used in turn.
-    points: [[[f64; 3]; SmallLoop::CAPACITY]; 2],
+    points: [[[f64; 4]; SmallLoop::CAPACITY]; 2],
     current: usize,
     len: usize,
 }
@@ -142,37 +143,45 @@ impl SmallLoop {
     /// in a plane cross it more than once: a cut adds at most half as many vertices as there are.
     const LONGEST: usize = 10;
 
+    #[inline]
     pub fn new<const N: usize>(corners: [[f64; 3]; N]) -> Self {
-        let mut points = [[[0.0; 3]; Self::CAPACITY]; 2];
-        points[0][..N].copy_from_slice(&corners);
+        let mut points = [[[0.0; 4]; Self::CAPACITY]; 2];
+        for (point, [x, y, z]) in points[0].iter_mut().zip(corners) {
+            *point = [x, y, z, 0.0];
+        }
         SmallLoop { points, current: 0, len: N }
     }
 
-    pub fn points(&self) -> &[[f64; 3]] {
+    #[inline]
+    pub fn points(&self) -> &[[f64; 4]] {
         &self.points[self.current][..self.len]
     }
 
-    /// Cuts the loop to one half-space (Sutherland, Hodgman 1974). `None` if it has run out of
-    /// room, in which case the caller falls back on boxes.
+    /// Cuts the loop to the points not below (`ABOVE`) or not above a plane (Sutherland, Hodgman
+    /// 1974). `None` if it has run out of room, in which case the caller falls back on boxes.
+    ///
+    /// Crossings are computed and points written always and kept only where they count: the sides
+    /// come at random, and a wrong guess would cost more.
     #[inline]
-    fn cut(&mut self, half: HalfSpace) -> Option<()> {
+    fn cut<const AXIS: usize, const ABOVE: bool>(&mut self, bound: f64) -> Option<()> {
         const MASK: usize = SmallLoop::CAPACITY - 1;
         if self.len == 0 || self.len > Self::LONGEST {
             return (self.len == 0).then_some(());
         }
         let [first, second] = &mut self.points;
         let (from, to) = if self.current == 0 { (first, second) } else { (second, first) };
+        let depth = |p: &[f64; 4]| if ABOVE { p[AXIS] - bound } else { bound - p[AXIS] };
         let mut len = 0;
         let mut p = from[(self.len - 1) & MASK];
-        let mut dp = half.depth(p);
+        let mut dp = depth(&p);
         for i in 0..self.len {
             let q = from[i & MASK];
-            let dq = half.depth(q);
-            if (dp < 0.0 && dq > 0.0) || (dp > 0.0 && dq < 0.0) {
-                to[len & MASK] = half.cut(p, q, dp, dq);
-                len += 1;
-            }
-            // Written always, kept only inside: cheaper than a branch.
+            let dq = depth(&q);
+            let t = dp / (dp - dq);
+            let mut x: [f64; 4] = std::array::from_fn(|a| p[a] + t * (q[a] - p[a]));
+            x[AXIS] = bound;
+            to[len & MASK] = x;
+            len += usize::from((dp < 0.0) & (dq > 0.0) | (dp > 0.0) & (dq < 0.0));
             to[len & MASK] = q;
             len += usize::from(dq >= 0.0);
             (p, dp) = (q, dq);
@@ -185,21 +194,49 @@ impl SmallLoop {
     /// Cuts the loop to `cell`, by those planes only that `bounds` (the loop's own box) crosses.
     #[inline]
     pub fn clip(mut self, bounds: &Aabb, cell: &Extent) -> Option<SmallLoop> {
-        for axis in 0..3 {
-            if f64::from(bounds.min[axis]) < cell.min[axis] {
-                self.cut(HalfSpace { axis, bound: cell.min[axis], above: true })?;
-            }
-            if f64::from(bounds.max[axis]) > cell.max[axis] {
-                self.cut(HalfSpace { axis, bound: cell.max[axis], above: false })?;
-            }
+        let below = |a: usize| f64::from(bounds.min[a]) < cell.min[a];
+        let above = |a: usize| f64::from(bounds.max[a]) > cell.max[a];
+        if below(0) {
+            self.cut::<0, true>(cell.min[0])?;
+        }
+        if above(0) {
+            self.cut::<0, false>(cell.max[0])?;
+        }
+        if below(1) {
+            self.cut::<1, true>(cell.min[1])?;
+        }
+        if above(1) {
+            self.cut::<1, false>(cell.max[1])?;
+        }
+        if below(2) {
+            self.cut::<2, true>(cell.min[2])?;
+        }
+        if above(2) {
+            self.cut::<2, false>(cell.max[2])?;
         }
         Some(self)
     }
 
+    /// The box of what is left.
+    #[inline]
+    pub fn extent(&self) -> Extent {
+        let (mut min, mut max) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
+        for p in self.points() {
+            for a in 0..4 {
+                min[a] = if p[a] < min[a] { p[a] } else { min[a] };
+                max[a] = if p[a] > max[a] { p[a] } else { max[a] };
+            }
+        }
+        Extent { min: [min[0], min[1], min[2]], max: [max[0], max[1], max[2]] }
+    }
+
     /// Cuts the loop to the slab of `cell` on one axis.
     pub fn clip_axis(mut self, axis: usize, cell: &Extent) -> Option<SmallLoop> {
-        self.cut(HalfSpace { axis, bound: cell.min[axis], above: true })?;
-        self.cut(HalfSpace { axis, bound: cell.max[axis], above: false })?;
+        match axis {
+            0 => self.cut::<0, true>(cell.min[0]).and_then(|()| self.cut::<0, false>(cell.max[0])),
+            1 => self.cut::<1, true>(cell.min[1]).and_then(|()| self.cut::<1, false>(cell.max[1])),
+            _ => self.cut::<2, true>(cell.min[2]).and_then(|()| self.cut::<2, false>(cell.max[2])),
+        }?;
         Some(self)
     }
 }
@@ -251,9 +288,9 @@ pub(super) fn clip_segment(p: [f64; 3], q: [f64; 3], cell: &Extent) -> Option<[[
 }
 
 /// Half the sum of cross products: a vector along the loop's normal as long as its area.
-pub(super) fn vector_area(points: &[[f64; 3]]) -> [f64; 3] {
+pub(super) fn vector_area<const N: usize>(points: &[[f64; N]]) -> [f64; 3] {
     let Some(&o) = points.first() else { return [0.0; 3] };
-    let sub = |p: [f64; 3]| [p[0] - o[0], p[1] - o[1], p[2] - o[2]];
+    let sub = |p: [f64; N]| [p[0] - o[0], p[1] - o[1], p[2] - o[2]];
     let mut sum = [0.0; 3];
     for pair in points.windows(2) {
         let (p, q) = (sub(pair[0]), sub(pair[1]));
@@ -278,14 +315,19 @@ pub(super) fn length(v: [f64; 3]) -> f64 {
 /// area left of `t` is the sum over the edges of the signed area between the edge and the line
 /// `b = 0`. An edge so changes the width by `b` and the slope by `db/dt` at its first end and takes
 /// both back at its second; at a vertex the widths of its two edges cancel.
-pub(super) fn loop_ramps(points: &[[f64; 3]], cell: &Aabb, axis: usize, out: &mut Vec<AreaRamp>) {
+pub(super) fn loop_ramps<const N: usize>(
+    points: &[[f64; N]],
+    cell: &Aabb,
+    axis: usize,
+    out: &mut Vec<AreaRamp>,
+) {
     let vector = vector_area(points);
     let area = length(vector);
     if area == 0.0 {
         return;
     }
     let (lower, extent) = (f64::from(cell.min[axis]), cell.extent(axis));
-    let local = |p: &[f64; 3]| (p[axis] - lower).clamp(0.0, extent);
+    let local = |p: &[f64; N]| (p[axis] - lower).clamp(0.0, extent);
     let (lo, hi) = points
         .iter()
         .map(local)
@@ -313,7 +355,7 @@ pub(super) fn loop_ramps(points: &[[f64; 3]], cell: &Aabb, axis: usize, out: &mu
 
     // One breakpoint a vertex; `scale` turns the projected area, signed, into the true one.
     let scale = -area / projected;
-    let at = |p: &[f64; 3]| (local(p), scale * (p[b] - b_lo));
+    let at = |p: &[f64; N]| (local(p), scale * (p[b] - b_lo));
     let edge = |(t0, b0): (f64, f64), (t1, b1): (f64, f64)| {
         let dt = t1 - t0;
         if dt.abs() > EDGE_SHARE * thickness {

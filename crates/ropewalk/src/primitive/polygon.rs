@@ -194,7 +194,8 @@ impl Polygon {
         let rectangle = [[lo[0], lo[1]], [hi[0], lo[1]], [hi[0], hi[1]], [lo[0], hi[1]]];
         let piece = SmallLoop::new(rectangle.map(|[u, v]| corner(u, v))).clip_axis(kw, cell)?;
         let tolerance = EDGE_TOLERANCE * self.magnitude;
-        for &p in piece.points() {
+        for &[x, y, z, _] in piece.points() {
+            let p = [x, y, z];
             if self.covers(p[ku], p[kv], tolerance) {
                 extent.add(p);
             }

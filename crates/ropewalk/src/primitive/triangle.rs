@@ -193,11 +193,7 @@ impl Primitive for Triangle {
             CLIP_SLACK * f64::from(bounds.min[a].abs().max(bounds.max[a].abs()))
         });
         let Some(clipped) = self.clipped(&bounds, cell, slack) else { return Some(loose) };
-        let mut extent = Extent::EMPTY;
-        for &p in clipped.points() {
-            extent.add(p);
-        }
-        overlap(&extent.outward(slack), &loose)
+        overlap(&clipped.extent().outward(slack), &loose)
     }
 
     fn area(&self) -> f64 {
