@@ -8,7 +8,7 @@ use ropewalk::build::{
 };
 use ropewalk::cost::LeafCost;
 use ropewalk::primitive::{Primitive, Sphere, Triangle};
-use ropewalk::tree::{BspTree, NodeKind};
+use ropewalk::tree::{BspTree, NodeKind, TreeStats};
 use ropewalk::{Geometry, Sides};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -186,7 +186,8 @@ fn presets_do_not_depend_on_the_number_of_threads() {
 fn binned_planes_predict_as_little_as_the_exact_sweep() {
     let geometry = soup(5000);
     let cost = |preset| {
-        let settings = BuildSettings { threads: 1, ..BuildSettings::preset(preset) };
+        let preset = BuildSettings::preset(preset);
+        let settings = BuildSettings { threads: 1, size_cost: 0.0, ..preset };
         let (tree, _) = checked(&geometry, &settings);
         let mut cost = 0.0;
         tree.for_each_node(|_, kind, cell, _| {
@@ -201,6 +202,19 @@ fn binned_planes_predict_as_little_as_the_exact_sweep() {
     let [fast, balanced, best] = Preset::ALL.map(cost);
     assert!(balanced < 1.03 * best, "{balanced} {best}");
     assert!(balanced < fast, "clipping pays: {balanced} {fast}");
+}
+
+#[test]
+fn a_price_of_memory_saves_references() {
+    let geometry = soup(5000);
+    let stats = |size_cost| {
+        let preset = BuildSettings::preset(Preset::Balanced);
+        checked(&geometry, &BuildSettings { threads: 1, size_cost, ..preset }).1.tree
+    };
+    let [none, some, more] = [0.0, 1.0, 10.0].map(stats);
+    assert!(none.references > some.references && some.references > more.references);
+    let tests = |s: &TreeStats| s.predicted_intersection_tests;
+    assert!(tests(&none) < tests(&some) && tests(&some) < tests(&more));
 }
 
 #[test]
@@ -367,6 +381,7 @@ fn settings_out_of_range_are_named() {
     let cases = [
         ("traversal_cost", BuildSettings { traversal_cost: f64::NAN, ..default.clone() }),
         ("empty_factor", BuildSettings { empty_factor: 0.0, ..default.clone() }),
+        ("size_cost", BuildSettings { size_cost: -1.0, ..default.clone() }),
         ("max_duplication", BuildSettings { max_duplication: 0.5, ..default.clone() }),
         (
             "leaf_cost.width",

@@ -35,6 +35,9 @@ struct Arguments {
     /// Overrides the cost of a traversal step.
     #[arg(long)]
     traversal_cost: Option<f64>,
+    /// Overrides the price of memory.
+    #[arg(long)]
+    size_cost: Option<f64>,
     /// Overrides the duplication limit.
     #[arg(long)]
     max_duplication: Option<f64>,
@@ -84,6 +87,7 @@ fn entries(arguments: &Arguments) -> anyhow::Result<Vec<Entry>> {
         let mut settings =
             BuildSettings { threads: arguments.threads, ..BuildSettings::preset(preset) };
         settings.traversal_cost = arguments.traversal_cost.unwrap_or(settings.traversal_cost);
+        settings.size_cost = arguments.size_cost.unwrap_or(settings.size_cost);
         settings.max_duplication = arguments.max_duplication.unwrap_or(settings.max_duplication);
         if preset == Preset::Balanced {
             settings.binned_from = arguments.binned_from.unwrap_or(settings.binned_from);

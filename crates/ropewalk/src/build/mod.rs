@@ -148,6 +148,8 @@ fn build_output(
         leaf_cost: settings.leaf_cost,
         traversal_cost: settings.traversal_cost,
         empty_factor: settings.empty_factor,
+        size_unit: settings.size_cost * geometry.bounds().area()
+            / settings.leaf_cost.cost(geometry.len()).max(1.0),
     };
     let search = plane_search(settings, pricing, blockage);
     let fragments: Vec<Fragment> = (0..geometry.len() as u32)

@@ -146,42 +146,52 @@ impl CellAreas {
     }
 }
 
+/// Largest price of one more unit of leaf cost to a ray that hits the node. Without it, detail that is
+/// small in a large scene would not be worth its memory, although somebody may look at nothing else.
+const MAX_SIZE_PRICE: f64 = 0.8;
+
 /// The constants of the cost of a plane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pricing {
     pub leaf_cost: LeafCost,
     pub traversal_cost: f64,
     pub empty_factor: f64,
+    /// Price of one more unit of leaf cost anywhere in the tree, times the area of the root.
+    pub size_unit: f64,
 }
 
 impl Pricing {
-    /// Price of one more unit of leaf cost below a node, in units of the node's cost.
+    /// Price of one more unit of leaf cost in the children than in the node, to a ray that hits it.
     #[inline]
-    pub fn size_price(&self, _areas: &CellAreas) -> f64 {
-        0.0
+    pub fn size_price(&self, areas: &CellAreas) -> f64 {
+        (self.size_unit / areas.area).min(MAX_SIZE_PRICE)
     }
 
-    /// `traversal_cost + measure`, the measure times `empty_factor` if a side is empty.
+    /// `traversal_cost + measure`, the measure times `empty_factor` if a side is empty, and the
+    /// price of what the children hold beyond the `total` of the node.
     #[inline]
     pub fn price<M: CostModel>(
         &self,
         model: &M,
         areas: &CellAreas,
         position: f32,
+        total: usize,
         (left, right): (usize, usize),
         (ends_left, ends_right): (f64, f64),
     ) -> f64 {
         let (area_left, area_right) = areas.parts(position);
+        let (cost_left, cost_right) = (self.leaf_cost.cost(left), self.leaf_cost.cost(right));
         let measure = model.cost(&Cut {
             area: areas.area,
             area_left,
             area_right,
-            cost_left: self.leaf_cost.cost(left),
-            cost_right: self.leaf_cost.cost(right),
+            cost_left,
+            cost_right,
             ends_left,
             ends_right,
         });
         let bonus = if left == 0 || right == 0 { self.empty_factor } else { 1.0 };
-        self.traversal_cost + bonus * measure
+        let growth = cost_left + cost_right - self.leaf_cost.cost(total);
+        self.traversal_cost + bonus * measure + self.size_price(areas) * growth
     }
 }

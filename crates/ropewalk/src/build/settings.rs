@@ -145,6 +145,10 @@ pub struct BuildSettings {
     pub traversal_cost: f64,
     /// Factor on the cost of a plane with an empty side, `0 < f <= 1`; 1 is off.
     pub empty_factor: f64,
+    /// Price of memory, in intersection tests of a ray through the scene: what it would cost to
+    /// store all primitives in leaves once more. A cut must gain more than the copies that it makes
+    /// cost, so that duplication goes where rays are likely. 0 is off.
+    pub size_cost: f64,
     /// Cut empty slabs off a node that would become a leaf (the paper's Figure 2).
     pub late_cutting: bool,
     /// Clip primitives to the cell ("perfect splits"); otherwise their boxes are sorted.
@@ -170,6 +174,7 @@ impl Default for BuildSettings {
             termination: Termination::Cost { max_depth: None },
             traversal_cost: 1.0,
             empty_factor: 0.8,
+            size_cost: 0.0,
             late_cutting: true,
             clipping: true,
             max_duplication: 32.0,
@@ -183,14 +188,15 @@ impl BuildSettings {
     /// The settings for a tree that is compiled to a [`WideTree`](crate::wide::WideTree): leaves
     /// cost their blocks of eight, and a step of three levels costs about as much as a block.
     pub fn preset(preset: Preset) -> Self {
-        let (binned_from, clipping) = match preset {
-            Preset::Fast => (0, false),
-            Preset::Balanced => (33, true),
-            Preset::Best => (usize::MAX, true),
+        let (binned_from, clipping, size_cost) = match preset {
+            Preset::Fast => (0, false, 0.75),
+            Preset::Balanced => (33, true, 0.75),
+            Preset::Best => (usize::MAX, true, 0.25),
         };
         BuildSettings {
             leaf_cost: LeafCost::Blocks { width: 8 },
             traversal_cost: 0.3,
+            size_cost,
             late_cutting: false,
             clipping,
             binned_from,
@@ -213,6 +219,8 @@ impl BuildSettings {
         number(c >= 0.0, "traversal_cost", c, "a finite number, at least 0")?;
         let f = self.empty_factor;
         number(f > 0.0 && f <= 1.0, "empty_factor", f, "above 0 and at most 1")?;
+        let s = self.size_cost;
+        number(s >= 0.0, "size_cost", s, "a finite number, at least 0")?;
         let d = self.max_duplication;
         number(d >= 1.0, "max_duplication", d, "a finite number, at least 1")?;
         match self.leaf_cost {

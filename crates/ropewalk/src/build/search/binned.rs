@@ -58,7 +58,7 @@ impl PlaneSearch for Binned {
         } else {
             tight.best_of_bins(node, &measures, &mut buffers.candidates)
         };
-        match (face, inner.plane(&areas, pricing)) {
+        match (face, inner.plane(&areas, count, pricing)) {
             (Some(face), Some(inner)) => Some(if inner.cost < face.cost { inner } else { face }),
             (face, inner) => face.or(inner),
         }
@@ -90,11 +90,13 @@ type Measures = [Option<AxisMeasure>; 3];
 pub(crate) struct Candidates {
     positions: [f32; MAX_CANDIDATES + LANES],
     len: usize,
+    /// False if no fragment is flat on the axis.
+    any_planar: bool,
 }
 
 impl Default for Candidates {
     fn default() -> Self {
-        Candidates { positions: [0.0; MAX_CANDIDATES + LANES], len: 0 }
+        Candidates { positions: [0.0; MAX_CANDIDATES + LANES], len: 0, any_planar: false }
     }
 }
 
@@ -102,17 +104,20 @@ impl Candidates {
     /// Collects all starts and ends above `min` and up to `max`; false if there are too many.
     #[inline]
     fn collect(&mut self, fragments: &[Fragment], axis: usize, (min, max): (f32, f32)) -> bool {
-        let mut len = 0;
+        let (mut len, mut any_planar) = (0, false);
         for f in fragments {
             if len + 2 > MAX_CANDIDATES {
                 return false;
             }
-            for x in [f.min(axis), f.max(axis)] {
-                // Written always, kept only inside: cheaper than a branch.
-                self.positions[len] = x;
-                len += usize::from(min < x && x <= max);
-            }
+            let (lo, hi) = (f.min(axis), f.max(axis));
+            any_planar |= lo == hi;
+            // Written always, kept only inside: cheaper than a branch.
+            self.positions[len] = lo;
+            len += usize::from((min < lo) & (lo <= max));
+            self.positions[len] = hi;
+            len += usize::from((min < hi) & (hi <= max));
         }
+        self.any_planar = any_planar;
         self.len = len.next_multiple_of(LANES);
         if len > 0 {
             let last = self.positions[len - 1];
@@ -123,6 +128,7 @@ impl Candidates {
 
     /// These few alone.
     fn set(&mut self, positions: &[f32]) {
+        self.any_planar = true;
         self.len = if positions.is_empty() { 0 } else { LANES };
         for (place, &position) in
             self.positions[..self.len].iter_mut().zip(positions.iter().cycle())
@@ -135,7 +141,8 @@ impl Candidates {
     #[inline]
     fn offer(&self, fragments: &[Fragment], axis: usize, measure: &AxisMeasure, best: &mut Best) {
         for positions in self.positions[..self.len].as_chunks::<LANES>().0 {
-            best.offer(measure, positions, &Tally::of(fragments, axis, positions));
+            let tally = Tally::of(fragments, axis, positions, self.any_planar);
+            best.offer(measure, positions, &tally);
         }
     }
 }
@@ -345,7 +352,7 @@ fn search_interval(
             break;
         }
         let positions = spread(interval);
-        let tally = Tally::of(fragments, axis, &positions);
+        let tally = Tally::of(fragments, axis, &positions, true);
         let mut samples = Best::NONE;
         samples.offer(measure, &positions, &tally);
         let Some((position, _)) = samples.cheapest() else { break };

@@ -79,7 +79,8 @@ fn priced_plane(
         if !areas.makes_progress(position, left, right, total) {
             continue;
         }
-        let cost = pricing.price(&MacDonaldBooth, areas, position, (left, right), (0.0, 0.0));
+        let children = (left, right);
+        let cost = pricing.price(&MacDonaldBooth, areas, position, total, children, (0.0, 0.0));
         if best.is_none_or(|b| cost < b.cost) {
             best = Some(Plane { axis, position, planar_left, cost, left, right });
         }

@@ -78,7 +78,7 @@ impl<M: CostModel> Sweep<'_, M> {
                 return;
             }
             let (p, children) = (ends(planar_left), (left, right));
-            let cost = self.pricing.price(&self.model, areas, position, children, p);
+            let cost = self.pricing.price(&self.model, areas, position, count, children, p);
             if cost < best.limit {
                 best.insert(Plane { axis, position, planar_left, cost, left, right });
             }
@@ -130,9 +130,9 @@ impl<M: CostModel> Sweep<'_, M> {
             if let Some(ends) = blockage.sampled_ends(&node.cell, &plane)
                 && let Some(areas) = CellAreas::new(&node.cell, plane.axis)
             {
-                let children = (plane.left, plane.right);
+                let (total, children) = (node.fragments.len(), (plane.left, plane.right));
                 plane.cost =
-                    self.pricing.price(&self.model, &areas, plane.position, children, ends);
+                    self.pricing.price(&self.model, &areas, plane.position, total, children, ends);
             }
             best.offer(plane);
         }

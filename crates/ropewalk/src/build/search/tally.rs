@@ -25,9 +25,9 @@ pub(super) struct Tally {
 impl Tally {
     pub const ZERO: Tally = Tally { left: [0.0; LANES], planar: [0.0; LANES], right: [0.0; LANES] };
 
-    /// Counts directly, on one axis.
+    /// Counts directly, on one axis; `any_planar` may be false if no fragment is flat there.
     #[inline]
-    pub fn of(fragments: &[Fragment], axis: usize, positions: &Lanes) -> Self {
+    pub fn of(fragments: &[Fragment], axis: usize, positions: &Lanes, any_planar: bool) -> Self {
         let mut tally = Tally::ZERO;
         for f in fragments {
             let (lo, hi) = (f.min(axis), f.max(axis));
@@ -36,7 +36,9 @@ impl Tally {
                 tally.right[c] += if hi > positions[c] { 1.0 } else { 0.0 };
             }
         }
-        // What reaches neither below nor above lies in the plane. Counted apart, since it is rare.
+        if !any_planar {
+            return tally;
+        }
         for f in fragments.iter().filter(|f| f.min(axis) == f.max(axis)) {
             let x = f.min(axis);
             for c in 0..LANES {
@@ -177,7 +179,12 @@ impl Best {
     }
 
     /// The cheapest plane, priced in `f64`.
-    pub fn plane(&self, areas: &[Option<CellAreas>; 3], pricing: &Pricing) -> Option<Plane> {
+    pub fn plane(
+        &self,
+        areas: &[Option<CellAreas>; 3],
+        total: usize,
+        pricing: &Pricing,
+    ) -> Option<Plane> {
         let lane = lowest(&self.measure);
         if self.measure[lane] == f32::INFINITY {
             return None;
@@ -186,7 +193,8 @@ impl Best {
         let (left, right) = (self.left[lane] as usize, self.right[lane] as usize);
         let (position, planar_left) = (self.position[lane], self.side[lane] >= 4.0);
         let areas = areas[axis].as_ref()?;
-        let cost = pricing.price(&MacDonaldBooth, areas, position, (left, right), (0.0, 0.0));
+        let children = (left, right);
+        let cost = pricing.price(&MacDonaldBooth, areas, position, total, children, (0.0, 0.0));
         Some(Plane { axis, position, planar_left, cost, left, right })
     }
 }

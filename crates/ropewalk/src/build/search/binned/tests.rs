@@ -37,8 +37,8 @@ fn leaf_cost() -> impl Strategy<Value = LeafCost> {
     ]
 }
 
-fn search(leaf_cost: LeafCost, from: usize) -> Binned {
-    let pricing = Pricing { leaf_cost, traversal_cost: 0.3, empty_factor: 0.8 };
+fn search(leaf_cost: LeafCost, size_unit: f64, from: usize) -> Binned {
+    let pricing = Pricing { leaf_cost, traversal_cost: 0.3, empty_factor: 0.8, size_unit };
     Binned { exact: Sweep { model: MacDonaldBooth, pricing, blockage: None }, from }
 }
 
@@ -51,9 +51,10 @@ fn node(fragments: &[Fragment], margin: f32) -> NodeView<'_> {
 proptest! {
     #[test]
     fn small_nodes_are_searched_exactly(
-        fragments in fragments(64), leaf_cost in leaf_cost(), margin in prop_oneof![Just(0.0f32), Just(1.0)]
+        fragments in fragments(64), leaf_cost in leaf_cost(), margin in prop_oneof![Just(0.0f32), Just(1.0)],
+        size_unit in prop_oneof![Just(0.0), Just(0.5), Just(20.0)]
     ) {
-        let (search, view) = (search(leaf_cost, usize::MAX), node(&fragments, margin));
+        let (search, view) = (search(leaf_cost, size_unit, usize::MAX), node(&fragments, margin));
         let mut buffers = SearchBuffers::default();
         let swept = search.swept(&view, &mut buffers);
         let found = search.best_plane(&view, &mut buffers);
@@ -71,9 +72,10 @@ proptest! {
 
     #[test]
     fn planes_have_true_counts_and_make_progress(
-        fragments in fragments(400), leaf_cost in leaf_cost(), margin in prop_oneof![Just(0.0f32), Just(1.0)]
+        fragments in fragments(400), leaf_cost in leaf_cost(), margin in prop_oneof![Just(0.0f32), Just(1.0)],
+        size_unit in prop_oneof![Just(0.0), Just(0.5), Just(20.0)]
     ) {
-        let (search, view) = (search(leaf_cost, 0), node(&fragments, margin));
+        let (search, view) = (search(leaf_cost, size_unit, 0), node(&fragments, margin));
         let Some(plane) = search.best_plane(&view, &mut SearchBuffers::default()) else {
             return Ok(());
         };
@@ -83,7 +85,7 @@ proptest! {
         prop_assert!(areas.makes_progress(plane.position, plane.left, plane.right, fragments.len()));
         let children = (plane.left, plane.right);
         let pricing = &search.exact.pricing;
-        let cost = pricing.price(&MacDonaldBooth, &areas, plane.position, children, (0.0, 0.0));
+        let cost = pricing.price(&MacDonaldBooth, &areas, plane.position, fragments.len(), children, (0.0, 0.0));
         prop_assert_eq!(plane.cost, cost);
     }
 }
@@ -96,7 +98,7 @@ fn extents_beyond_f32_are_swept() {
     });
     let fragments: Vec<Fragment> =
         boxes.enumerate().map(|(i, b)| Fragment::new(i as u32, &b)).collect();
-    let search = search(LeafCost::Linear, 0);
+    let search = search(LeafCost::Linear, 0.0, 0);
     let (view, mut buffers) = (node(&fragments, 0.0), SearchBuffers::default());
     assert_eq!(search.best_plane(&view, &mut buffers), search.swept(&view, &mut buffers));
 }

@@ -55,8 +55,14 @@ fn brute_force<M: CostModel>(search: &Sweep<'_, M>, node: &NodeView<'_>) -> Opti
                     let area_left = if planar_left { below + in_plane } else { below };
                     ends_of_sides(blockage, &areas, position, area_left, all + rest - area_left)
                 });
-                let cost =
-                    search.pricing.price(&search.model, &areas, position, (left, right), ends);
+                let cost = search.pricing.price(
+                    &search.model,
+                    &areas,
+                    position,
+                    count,
+                    (left, right),
+                    ends,
+                );
                 best = Some(best.map_or(cost, |b: f64| b.min(cost)));
             }
         }
@@ -66,7 +72,12 @@ fn brute_force<M: CostModel>(search: &Sweep<'_, M>, node: &NodeView<'_>) -> Opti
 
 fn check<M: CostModel>(model: M, geometry: &Geometry, estimator: TerminationEstimator) {
     let blockage = Blockage::new(geometry, estimator, None);
-    let pricing = Pricing { leaf_cost: LeafCost::Linear, traversal_cost: 1.0, empty_factor: 0.8 };
+    let pricing = Pricing {
+        leaf_cost: LeafCost::Linear,
+        traversal_cost: 1.0,
+        empty_factor: 0.8,
+        size_unit: 0.0,
+    };
     let blockage = M::USES_TERMINATION.then_some(&blockage);
     let search = Sweep { model, pricing, blockage };
     let (arena, size) = Arena::new(fragments(geometry), true, false);
