@@ -10,7 +10,10 @@ use super::plane::{Plane, Side};
 use crate::aabb::Aabb;
 use crate::geometry::Geometry;
 use crate::primitive::Primitive;
-use rayon::slice::ParallelSliceMut;
+use rayon::prelude::*;
+
+/// Fragments that one thread classifies and clips at a time; larger nodes are split in such pieces.
+const PIECE: usize = 1 << 15;
 
 /// How much of the arena belongs to one node.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -24,6 +27,7 @@ pub(crate) struct NodeSize {
 pub(crate) struct Arena {
     fragments: Vec<Fragment>,
     events: [Vec<Event>; 3],
+    parallel: bool,
 }
 
 /// How straddling primitives are cut.
@@ -114,7 +118,7 @@ impl Arena {
             fragments: fragments.len(),
             events: std::array::from_fn(|axis| events[axis].len()),
         };
-        (Arena { fragments, events }, size)
+        (Arena { fragments, events, parallel }, size)
     }
 
     /// The fragments of the node on top.
@@ -148,6 +152,7 @@ impl Arena {
             events: std::array::from_fn(|axis| {
                 take(&mut self.events[axis], top.events[axis], below.events[axis])
             }),
+            parallel: self.parallel,
         }
     }
 
@@ -230,7 +235,8 @@ impl Arena {
         (left.len(), rights)
     }
 
-    /// Sends the fragments on top, which have no events, to the children.
+    /// Sends the fragments on top, which have no events, to the children. Large nodes are split in
+    /// pieces, in parallel if wanted; the order is that of one piece.
     fn split_alone(
         &mut self,
         count: usize,
@@ -240,56 +246,38 @@ impl Arena {
         buffers: &mut SplitBuffers,
     ) -> (usize, usize) {
         let base = self.fragments.len() - count;
-        let SplitBuffers { left_fragments, straddlers, .. } = buffers;
-        if left_fragments.len() < count {
-            left_fragments.resize(count, Fragment::default());
-            straddlers.resize(count, (0, 0));
+        let split = |piece: &mut [Fragment], buffers: &mut SplitBuffers| {
+            split_piece(piece, plane, cells, clipper, buffers)
+        };
+        if count <= PIECE {
+            let (l, r) = split(&mut self.fragments[base..], buffers);
+            self.fragments.truncate(base + r);
+            self.fragments.extend_from_slice(&buffers.left_fragments[..l]);
+            return (l, r);
         }
         let own = &mut self.fragments[base..];
-        let (lefts, straddlers) = (&mut left_fragments[..count], &mut straddlers[..count]);
-        let (axis, position) = (plane.axis, plane.position);
-        // Both writes are unconditional and only the counters depend on the side: a branch here
-        // would be taken at random.
-        let (mut l, mut r, mut both) = (0, 0, 0);
-        for i in 0..count {
-            let f = own[i];
-            let (lo, hi) = (f.min(axis), f.max(axis));
-            let planar = lo == hi && lo == position;
-            let goes_left = lo < position || planar && plane.planar_left;
-            let goes_right = hi > position || planar && !plane.planar_left;
-            lefts[l] = f; // l <= i < count
-            own[r] = f; // r <= i: read already
-            straddlers[both] = (l as u32, r as u32);
-            l += usize::from(goes_left);
-            r += usize::from(goes_right);
-            both += usize::from(goes_left && goes_right);
+        let split = |piece: &mut [Fragment]| {
+            let mut buffers = SplitBuffers::default();
+            let (l, r) = split(piece, &mut buffers);
+            buffers.left_fragments.truncate(l);
+            (buffers.left_fragments, r)
+        };
+        let parts: Vec<(Vec<Fragment>, usize)> = if self.parallel {
+            own.par_chunks_mut(PIECE).map(split).collect()
+        } else {
+            own.chunks_mut(PIECE).map(split).collect()
+        };
+        let mut end = base;
+        for (i, &(_, r)) in parts.iter().enumerate() {
+            let start = base + i * PIECE;
+            self.fragments.copy_within(start..start + r, end);
+            end += r;
         }
-        let mut gone = (0, 0);
-        for &(at_left, at_right) in &straddlers[..both] {
-            let (left, right) = (&mut lefts[at_left as usize], &mut own[at_right as usize]);
-            gone.0 += usize::from(clipper.clip_away(left, &cells.0));
-            gone.1 += usize::from(clipper.clip_away(right, &cells.1));
+        self.fragments.truncate(end);
+        for (lefts, _) in &parts {
+            self.fragments.extend_from_slice(lefts);
         }
-        self.fragments.truncate(base + r);
-        self.fragments.extend_from_slice(&lefts[..l]);
-        let (l, r) = (l - gone.0, r - gone.1);
-        if gone != (0, 0) {
-            self.sweep_out(base);
-        }
-        debug_assert_eq!(self.fragments.len(), base + l + r);
-        (l, r)
-    }
-
-    /// Removes the fragments from `base` on that turned out to be empty.
-    #[cold]
-    fn sweep_out(&mut self, base: usize) {
-        let mut kept = base;
-        for i in base..self.fragments.len() {
-            let f = self.fragments[i];
-            self.fragments[kept] = f;
-            kept += usize::from(!f.is_gone());
-        }
-        self.fragments.truncate(kept);
+        (self.fragments.len() - end, end - base)
     }
 
     /// Sends the sorted events on top to the children and merges in those of the straddlers.
@@ -325,6 +313,65 @@ impl Arena {
         let right = stack.len() - base;
         append_merged(stack, &lefts[..l], new_left);
         (stack.len() - base - right, right)
+    }
+}
+
+/// Splits the fragments of `own`: those of the upper child come to its front, those of the lower one
+/// to `buffers.left_fragments`; their numbers, lower child first.
+fn split_piece(
+    own: &mut [Fragment],
+    plane: &Plane,
+    cells: &(Aabb, Aabb),
+    clipper: Clipper<'_>,
+    buffers: &mut SplitBuffers,
+) -> (usize, usize) {
+    let count = own.len();
+    let SplitBuffers { left_fragments, straddlers, .. } = buffers;
+    if left_fragments.len() < count {
+        left_fragments.resize(count, Fragment::default());
+        straddlers.resize(count, (0, 0));
+    }
+    let (lefts, straddlers) = (&mut left_fragments[..count], &mut straddlers[..count]);
+    let (axis, position) = (plane.axis, plane.position);
+    // Both writes are unconditional and only the counters depend on the side: a branch here would be
+    // taken at random.
+    let (mut l, mut r, mut both) = (0, 0, 0);
+    for i in 0..count {
+        let f = own[i];
+        let (lo, hi) = (f.min(axis), f.max(axis));
+        let planar = (lo == hi) & (lo == position);
+        let goes_left = (lo < position) | (planar & plane.planar_left);
+        let goes_right = (hi > position) | (planar & !plane.planar_left);
+        lefts[l] = f; // l <= i < count
+        own[r] = f; // r <= i: read already
+        straddlers[both] = (l as u32, r as u32);
+        l += usize::from(goes_left);
+        r += usize::from(goes_right);
+        both += usize::from(goes_left & goes_right);
+    }
+    let (mut gone_left, mut gone_right) = (0, 0);
+    for &(at_left, at_right) in &straddlers[..both] {
+        let (left, right) = (&mut lefts[at_left as usize], &mut own[at_right as usize]);
+        gone_left += usize::from(clipper.clip_away(left, &cells.0));
+        gone_right += usize::from(clipper.clip_away(right, &cells.1));
+    }
+    if gone_left > 0 {
+        sweep_out(&mut lefts[..l]);
+    }
+    if gone_right > 0 {
+        sweep_out(&mut own[..r]);
+    }
+    (l - gone_left, r - gone_right)
+}
+
+/// Moves the fragments of which something is left to the front.
+#[cold]
+fn sweep_out(fragments: &mut [Fragment]) {
+    let mut kept = 0;
+    for i in 0..fragments.len() {
+        let f = fragments[i];
+        fragments[kept] = f;
+        kept += usize::from(!f.is_gone());
     }
 }
 

@@ -32,6 +32,7 @@ use arena::Clipper;
 use blockage::{Blockage, estimator_stats};
 use fragment::Fragment;
 use plane::Pricing;
+use rayon::prelude::*;
 use search::{Binned, MacDonaldBooth1990, ObjectMedian, PlaneSearch, SpatialMedian, Sweep};
 use std::sync::atomic::AtomicU64;
 use std::time::Instant;
@@ -152,9 +153,13 @@ fn build_output(
             / settings.leaf_cost.cost(geometry.len()).max(1.0),
     };
     let search = plane_search(settings, pricing, blockage);
-    let fragments: Vec<Fragment> = (0..geometry.len() as u32)
-        .map(|prim| Fragment::new(prim, &geometry.shape(prim).bounds()))
-        .collect();
+    let fragment = |prim| Fragment::new(prim, &geometry.shape(prim).bounds());
+    let prims = 0..geometry.len() as u32;
+    let fragments: Vec<Fragment> = if settings.threads == 1 {
+        prims.map(fragment).collect()
+    } else {
+        prims.into_par_iter().map(fragment).collect()
+    };
     let references = (settings.max_duplication * fragments.len() as f64) as u64;
     let context = Context {
         search: search.as_ref(),
@@ -182,7 +187,7 @@ fn plane_search<'a>(
             let exact = Sweep { model: cost::MacDonaldBooth, pricing, blockage: None };
             match settings.binned_from {
                 usize::MAX => Box::new(exact),
-                from => Box::new(Binned { exact, from }),
+                from => Box::new(Binned { exact, from, parallel: settings.threads != 1 }),
             }
         }
         Measure::HavranPrinted => Box::new(Sweep { model: cost::HavranPrinted, pricing, blockage }),

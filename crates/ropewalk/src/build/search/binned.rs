@@ -6,6 +6,7 @@ use super::{NodeView, PlaneSearch, SearchBuffers, Sweep, priced_plane};
 use crate::build::fragment::Fragment;
 use crate::build::plane::{CellAreas, Counts, Plane, Pricing};
 use crate::cost::MacDonaldBooth;
+use rayon::prelude::*;
 
 /// Extents within which positions can be spread in `f32`.
 const SPREADABLE: std::ops::Range<f32> = 1e-30..1e30;
@@ -30,6 +31,42 @@ pub(crate) struct Binned {
     pub exact: Sweep<'static, MacDonaldBooth>,
     /// Nodes with fewer fragments are searched exactly.
     pub from: usize,
+    /// True if large nodes may be counted by several threads.
+    pub parallel: bool,
+}
+
+/// Fragments counted at a time: by one thread, and few enough for exact sums in `f32`.
+const PIECE: usize = 1 << 16;
+
+/// The fragments of a node, counted in pieces.
+#[derive(Clone, Copy)]
+struct Pieces<'a> {
+    all: &'a [Fragment],
+    parallel: bool,
+}
+
+impl Pieces<'_> {
+    /// Adds up what `count` says of each piece. The result does not depend on the threads.
+    #[inline]
+    fn sum<T: Send>(&self, count: impl Fn(&[Fragment]) -> T + Sync, add: impl Fn(&mut T, T)) -> T {
+        if self.all.len() <= PIECE {
+            return count(self.all);
+        }
+        let pieces: Vec<T> = if self.parallel {
+            self.all.par_chunks(PIECE).map(&count).collect()
+        } else {
+            self.all.chunks(PIECE).map(&count).collect()
+        };
+        let mut pieces = pieces.into_iter();
+        // More than PIECE fragments make at least one piece.
+        let mut sum = pieces.next().unwrap_or_else(|| count(&[]));
+        pieces.for_each(|piece| add(&mut sum, piece));
+        sum
+    }
+
+    fn tally(&self, axis: usize, positions: &Lanes, any_planar: bool) -> Tally {
+        self.sum(|piece| Tally::of(piece, axis, positions, any_planar), Tally::add)
+    }
 }
 
 impl PlaneSearch for Binned {
@@ -40,9 +77,10 @@ impl PlaneSearch for Binned {
     fn best_plane(&self, node: &NodeView<'_>, buffers: &mut SearchBuffers) -> Option<Plane> {
         let pricing = &self.exact.pricing;
         let count = node.fragments.len();
-        let tight = Tight::of(node.fragments);
+        let fragments = Pieces { all: node.fragments, parallel: self.parallel };
+        let tight = fragments.sum(Tight::of, Tight::add);
         let areas = std::array::from_fn(|axis| CellAreas::new(&node.cell, axis));
-        let face = tight.best_face(node, &areas, pricing);
+        let face = tight.best_face(fragments, &areas, pricing);
         // Where no set is cheaper than the whole, only cutting off empty space can pay.
         if pricing.leaf_cost.cost(1) == pricing.leaf_cost.cost(count) {
             return face;
@@ -54,9 +92,9 @@ impl PlaneSearch for Binned {
             areas.map(|a| AxisMeasure::new(a, axis, count, width, pricing))
         });
         let inner = if 2 * count <= MAX_CANDIDATES && count < self.from {
-            tight.best_of_all(node, &measures, &mut buffers.candidates)
+            tight.best_of_all(fragments, &measures, &mut buffers.candidates)
         } else {
-            tight.best_of_bins(node, &measures, &mut buffers.candidates)
+            tight.best_of_bins(fragments, &measures, &mut buffers.candidates)
         };
         match (face, inner.plane(&areas, count, pricing)) {
             (Some(face), Some(inner)) => Some(if inner.cost < face.cost { inner } else { face }),
@@ -139,9 +177,9 @@ impl Candidates {
 
     /// Counts and offers all of them.
     #[inline]
-    fn offer(&self, fragments: &[Fragment], axis: usize, measure: &AxisMeasure, best: &mut Best) {
+    fn offer(&self, fragments: Pieces<'_>, axis: usize, measure: &AxisMeasure, best: &mut Best) {
         for positions in self.positions[..self.len].as_chunks::<LANES>().0 {
-            let tally = Tally::of(fragments, axis, positions, self.any_planar);
+            let tally = fragments.tally(axis, positions, self.any_planar);
             best.offer(measure, positions, &tally);
         }
     }
@@ -151,18 +189,26 @@ impl Candidates {
 struct Tight {
     min: [f32; 3],
     max: [f32; 3],
+    /// False if no fragment is flat.
+    any_planar: bool,
 }
 
 impl Tight {
     fn of(fragments: &[Fragment]) -> Self {
-        let (mut min, mut max) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
-        for f in fragments {
-            for i in 0..8 {
-                min[i] = if f.lanes[i] < min[i] { f.lanes[i] } else { min[i] };
-                max[i] = if f.lanes[i] > max[i] { f.lanes[i] } else { max[i] };
-            }
+        let (min, max, flat) = extremes(fragments);
+        Tight {
+            min: [min[0], min[1], min[2]],
+            max: [max[4], max[5], max[6]],
+            any_planar: flat[..3] != [0.0; 3],
         }
-        Tight { min: [min[0], min[1], min[2]], max: [max[4], max[5], max[6]] }
+    }
+
+    fn add(&mut self, other: Tight) {
+        for a in 0..3 {
+            self.min[a] = self.min[a].min(other.min[a]);
+            self.max[a] = self.max[a].max(other.max[a]);
+        }
+        self.any_planar |= other.any_planar;
     }
 
     /// The range of positions strictly inside the box: above the first and up to the second.
@@ -182,23 +228,23 @@ impl Tight {
     /// lies in the face.
     fn best_face(
         &self,
-        node: &NodeView<'_>,
+        fragments: Pieces<'_>,
         areas: &[Option<CellAreas>; 3],
         pricing: &Pricing,
     ) -> Option<Plane> {
-        // Negative and positive lanes of the faces: a fragment lies in a lower face if it ends
-        // there, and in an upper one if it starts there.
-        let count = node.fragments.len();
-        let (mut in_min, mut in_max) = ([0.0f32; 4], [0.0f32; 4]);
-        let [x0, y0, z0] = self.min;
-        let [x1, y1, z1] = self.max;
-        let (min, max) = ([x0, y0, z0, 0.0], [x1, y1, z1, 0.0]);
-        for f in node.fragments {
-            for i in 0..4 {
-                in_min[i] += if f.lanes[4 + i] <= min[i] { 1.0 } else { 0.0 };
-                in_max[i] += if f.lanes[i] >= max[i] { 1.0 } else { 0.0 };
-            }
-        }
+        let count = fragments.all.len();
+        let [in_min, in_max] = if self.any_planar {
+            fragments.sum(
+                |piece| self.in_faces(piece),
+                |sum, piece| {
+                    for (sum, piece) in sum.iter_mut().flatten().zip(piece.iter().flatten()) {
+                        *sum += piece;
+                    }
+                },
+            )
+        } else {
+            [[0.0; 4]; 2]
+        };
         let mut best: Option<Plane> = None;
         for axis in 0..3 {
             let Some(areas) = &areas[axis] else { continue };
@@ -218,18 +264,33 @@ impl Tight {
         best
     }
 
+    /// How many fragments lie in the lower and in the upper face of each axis.
+    fn in_faces(&self, fragments: &[Fragment]) -> [[f32; 4]; 2] {
+        let (mut in_min, mut in_max) = ([0.0f32; 4], [0.0f32; 4]);
+        let [x0, y0, z0] = self.min;
+        let [x1, y1, z1] = self.max;
+        let (min, max) = ([x0, y0, z0, 0.0], [x1, y1, z1, 0.0]);
+        for f in fragments {
+            for i in 0..4 {
+                in_min[i] += if f.lanes[4 + i] <= min[i] { 1.0 } else { 0.0 };
+                in_max[i] += if f.lanes[i] >= max[i] { 1.0 } else { 0.0 };
+            }
+        }
+        [in_min, in_max]
+    }
+
     /// The cheapest of all starts and ends strictly inside the box.
     fn best_of_all(
         &self,
-        node: &NodeView<'_>,
+        fragments: Pieces<'_>,
         measures: &Measures,
         candidates: &mut Candidates,
     ) -> Best {
         let mut best = Best::NONE;
         for (axis, measure) in measures.iter().enumerate() {
             let Some(measure) = measure else { continue };
-            candidates.collect(node.fragments, axis, self.inside(axis));
-            candidates.offer(node.fragments, axis, measure, &mut best);
+            candidates.collect(fragments.all, axis, self.inside(axis));
+            candidates.offer(fragments, axis, measure, &mut best);
         }
         best
     }
@@ -237,13 +298,14 @@ impl Tight {
     /// The cheapest start or end beside the cheapest boundaries of bins.
     fn best_of_bins(
         &self,
-        node: &NodeView<'_>,
+        fragments: Pieces<'_>,
         measures: &Measures,
         candidates: &mut Candidates,
     ) -> Best {
-        let bins = Bins::of(node.fragments, self);
+        let grid = Grid::over(self);
+        let bins = fragments.sum(|piece| Bins::of(piece, &grid), Bins::add);
         let mut boundaries: [Option<Boundary>; 3] = std::array::from_fn(|axis| {
-            measures[axis].as_ref().and_then(|m| bins.best_boundary(axis, m, node.fragments.len()))
+            measures[axis].as_ref().and_then(|m| bins.best_boundary(axis, m, &grid))
         });
         boundaries.sort_by(|a, b| match (a, b) {
             (Some(a), Some(b)) => a.measure.total_cmp(&b.measure),
@@ -255,9 +317,9 @@ impl Tight {
             if sampled >= best.lowest() {
                 break;
             }
-            let edges = (bins.edge(axis, bin - 1), bins.edge(axis, bin + 1));
+            let edges = (grid.edge(axis, bin - 1), grid.edge(axis, bin + 1));
             let ranges = (edges, self.inside(axis));
-            search_interval(node.fragments, axis, ranges, measure, candidates, &mut best);
+            search_interval(fragments, axis, ranges, measure, candidates, &mut best);
         }
         best
     }
@@ -266,14 +328,17 @@ impl Tight {
 /// Bins on each axis.
 const BINS: usize = 32;
 
-/// How many fragments start and end in each bin of each axis. Bin `b` holds what rounds to `b`, so
-/// that the outermost ones are half as wide.
-struct Bins {
-    starts: [[u32; BINS]; 3],
-    ends: [[u32; BINS]; 3],
+/// Where the bins lie: bin `b` holds what rounds to `b`, so that the outermost ones are half as wide.
+struct Grid {
     origin: [f32; 4],
     /// Bins per unit; 0 on an axis without extent.
     scale: [f32; 4],
+}
+
+/// How many fragments start and end in each bin of each axis.
+struct Bins {
+    starts: [[u32; BINS]; 3],
+    ends: [[u32; BINS]; 3],
 }
 
 /// The lower edge of a bin, and what a plane there costs.
@@ -286,18 +351,29 @@ struct Boundary {
 /// Adding it rounds a number of `0 ..= 2^22` to an integer that stands in the low bits.
 const ROUNDING: f32 = (1u32 << 23) as f32;
 
-impl Bins {
-    fn of(fragments: &[Fragment], tight: &Tight) -> Self {
+impl Grid {
+    fn over(tight: &Tight) -> Self {
         let (mut origin, mut scale) = ([0.0; 4], [0.0; 4]);
         for axis in 0..3 {
             let extent = tight.max[axis] - tight.min[axis];
             origin[axis] = tight.min[axis];
             scale[axis] = if extent > 0.0 { (BINS - 1) as f32 / extent } else { 0.0 };
         }
-        let mut bins = Bins { starts: [[0; BINS]; 3], ends: [[0; BINS]; 3], origin, scale };
+        Grid { origin, scale }
+    }
+
+    /// Where bin `b` begins, up to rounding.
+    fn edge(&self, axis: usize, b: usize) -> f32 {
+        self.origin[axis] + (b as f32 - 0.5) / self.scale[axis]
+    }
+}
+
+impl Bins {
+    fn of(fragments: &[Fragment], grid: &Grid) -> Self {
+        let mut bins = Bins { starts: [[0; BINS]; 3], ends: [[0; BINS]; 3] };
         for f in fragments {
             let bin: [u32; 8] = std::array::from_fn(|i| {
-                ((f.lanes[i] - origin[i & 3]) * scale[i & 3] + ROUNDING).to_bits()
+                ((f.lanes[i] - grid.origin[i & 3]) * grid.scale[i & 3] + ROUNDING).to_bits()
             });
             for axis in 0..3 {
                 bins.starts[axis][bin[axis] as usize & (BINS - 1)] += 1;
@@ -307,16 +383,19 @@ impl Bins {
         bins
     }
 
-    /// Where bin `b` begins, up to rounding.
-    fn edge(&self, axis: usize, b: usize) -> f32 {
-        self.origin[axis] + (b as f32 - 0.5) / self.scale[axis]
+    fn add(&mut self, other: Bins) {
+        let add = |sums: &mut [[u32; BINS]; 3], counts: &[[u32; BINS]; 3]| {
+            sums.iter_mut().flatten().zip(counts.iter().flatten()).for_each(|(s, c)| *s += c);
+        };
+        add(&mut self.starts, &other.starts);
+        add(&mut self.ends, &other.ends);
     }
 
     /// The cheapest boundary between two bins.
-    fn best_boundary(&self, axis: usize, measure: &AxisMeasure, count: usize) -> Option<Boundary> {
+    fn best_boundary(&self, axis: usize, measure: &AxisMeasure, grid: &Grid) -> Option<Boundary> {
         let mut samples = Best::NONE;
-        let (mut left, mut right) = (0, count as u32);
-        let (origin, step) = (self.origin[axis] - 0.5 / self.scale[axis], 1.0 / self.scale[axis]);
+        let (mut left, mut right) = (0, self.ends[axis].iter().sum::<u32>());
+        let (origin, step) = (grid.edge(axis, 0), 1.0 / grid.scale[axis]);
         for half in 0..BINS / LANES {
             let mut tally = Tally::ZERO;
             let mut positions = [0.0; LANES];
@@ -331,14 +410,14 @@ impl Bins {
             samples.offer(measure, &positions, &tally);
         }
         let (position, measure) = samples.cheapest()?;
-        let bin = ((position - origin) * self.scale[axis]).round() as usize;
+        let bin = ((position - origin) * grid.scale[axis]).round() as usize;
         Some(Boundary { axis, bin: bin.clamp(1, BINS - 1), measure })
     }
 }
 
 /// Offers the starts and ends in an interval; where they are many, those around its cheapest part.
 fn search_interval(
-    fragments: &[Fragment],
+    fragments: Pieces<'_>,
     axis: usize,
     (mut interval, inside): ((f32, f32), (f32, f32)),
     measure: &AxisMeasure,
@@ -346,25 +425,43 @@ fn search_interval(
     best: &mut Best,
 ) {
     interval = (interval.0.max(inside.0), interval.1.min(inside.1));
-    let mut found = candidates.collect(fragments, axis, interval);
+    let mut found = candidates.collect(fragments.all, axis, interval);
     for _ in 0..ZOOMS {
         if found {
             break;
         }
         let positions = spread(interval);
-        let tally = Tally::of(fragments, axis, &positions, true);
+        let tally = fragments.tally(axis, &positions, true);
         let mut samples = Best::NONE;
         samples.offer(measure, &positions, &tally);
         let Some((position, _)) = samples.cheapest() else { break };
         let step = (interval.1 - interval.0) / LANES as f32;
         interval = ((position - step).max(interval.0), (position + step).min(interval.1));
-        found = candidates.collect(fragments, axis, interval);
+        found = candidates.collect(fragments.all, axis, interval);
     }
     if !found || candidates.len == 0 {
         let middle = 0.5 * (interval.0 + interval.1);
-        candidates.set(&beside(fragments, axis, (middle, middle), inside));
+        candidates.set(&beside(fragments.all, axis, (middle, middle), inside));
     }
     candidates.offer(fragments, axis, measure, best);
+}
+
+/// The extremes of all lanes, and for each axis something else than 0 if a fragment is flat there.
+/// Not inlined, or the compiler would take the lanes apart that nobody reads.
+#[inline(never)]
+fn extremes(fragments: &[Fragment]) -> ([f32; 8], [f32; 8], [f32; 4]) {
+    let (mut min, mut max) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
+    let mut flat = [0.0; 4];
+    for f in fragments {
+        for i in 0..8 {
+            min[i] = if f.lanes[i] < min[i] { f.lanes[i] } else { min[i] };
+            max[i] = if f.lanes[i] > max[i] { f.lanes[i] } else { max[i] };
+        }
+        for i in 0..4 {
+            flat[i] = if f.lanes[i] == f.lanes[4 + i] { 1.0 } else { flat[i] };
+        }
+    }
+    (min, max, flat)
 }
 
 /// Evenly spaced positions in a range; the last one is its end.

@@ -25,6 +25,14 @@ pub(super) struct Tally {
 impl Tally {
     pub const ZERO: Tally = Tally { left: [0.0; LANES], planar: [0.0; LANES], right: [0.0; LANES] };
 
+    pub fn add(&mut self, other: Tally) {
+        for c in 0..LANES {
+            self.left[c] += other.left[c];
+            self.planar[c] += other.planar[c];
+            self.right[c] += other.right[c];
+        }
+    }
+
     /// Counts directly, on one axis; `any_planar` may be false if no fragment is flat there.
     #[inline]
     pub fn of(fragments: &[Fragment], axis: usize, positions: &Lanes, any_planar: bool) -> Self {
@@ -114,7 +122,13 @@ impl AxisMeasure {
 /// The lane with the lowest value, the first one on ties.
 #[inline]
 pub(super) fn lowest(lanes: &Lanes) -> usize {
-    (1..LANES).fold(0, |best, c| if lanes[c] < lanes[best] { c } else { best })
+    let mut low = *lanes;
+    for half in [8, 4, 2, 1] {
+        for c in 0..half {
+            low[c] = if low[c + half] < low[c] { low[c + half] } else { low[c] };
+        }
+    }
+    lanes.iter().position(|&x| x == low[0]).unwrap_or(0)
 }
 
 /// The cheapest position of each lane so far.

@@ -39,7 +39,11 @@ fn leaf_cost() -> impl Strategy<Value = LeafCost> {
 
 fn search(leaf_cost: LeafCost, size_unit: f64, from: usize) -> Binned {
     let pricing = Pricing { leaf_cost, traversal_cost: 0.3, empty_factor: 0.8, size_unit };
-    Binned { exact: Sweep { model: MacDonaldBooth, pricing, blockage: None }, from }
+    Binned {
+        exact: Sweep { model: MacDonaldBooth, pricing, blockage: None },
+        from,
+        parallel: false,
+    }
 }
 
 fn node(fragments: &[Fragment], margin: f32) -> NodeView<'_> {
