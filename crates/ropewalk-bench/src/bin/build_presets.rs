@@ -126,8 +126,8 @@ impl Entry {
             Spread::of(&self.seconds.iter().map(of).collect::<Vec<_>>()).map_or(0.0, |s| s.median)
         };
         let n = geometry.len() as f64;
-        let planes = wide.treelets().iter().flat_map(|t| t.plane).filter(|p| p.is_finite()).count();
-        let treelet_bytes = size_of_val(wide.treelets());
+        let planes = tree.nodes().len() / 2;
+        let treelet_bytes = wide.treelets() * size_of::<Treelet>();
         println!(
             "{scene},{},{},{:.3},{:.3},{:.3},{:.1},{:.3},{:.3},{:.3},{:.3},{},{:.4},{}",
             self.name,
@@ -137,10 +137,10 @@ impl Entry {
             median(&|s| s[1]),
             wide.bytes() as f64 / n,
             tree.reference_count() as f64 / n,
-            tree.reference_count() as f64 / (8 * wide.blocks().len().max(1)) as f64,
-            planes as f64 / (7 * (treelet_bytes / size_of::<Treelet>()).max(1)) as f64,
+            tree.reference_count() as f64 / (8 * wide.blocks().max(1)) as f64,
+            planes as f64 / (7 * wide.treelets().max(1)) as f64,
             treelet_bytes as f64 / wide.bytes() as f64,
-            tree.nodes().len() / 2,
+            planes,
             predicted_cost(tree, &BuildSettings::preset(Preset::Best)),
             peak_mib().unwrap_or(0),
         );
