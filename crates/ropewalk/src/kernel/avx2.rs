@@ -5,7 +5,7 @@
 
 use super::level::{Found, Nearest, Range, Root, Simd};
 use super::slot::{Loaded, Slot};
-use super::x86::{self, Children};
+use super::x86::{self, Children, Lanes};
 use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
 use std::arch::x86_64::*;
@@ -68,22 +68,23 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn meets(slot: &Slot, block: &Block) -> u32 {
+        // SAFETY: the caller vouches for the features.
+        unsafe {
+            let lanes = x86::lanes(slot, block);
+            let (limit, t_min) = (_mm256_set1_ps(slot.limit), _mm256_set1_ps(slot.t_min));
+            _mm256_movemask_ps(meets(&lanes, limit, t_min)) as u32
+        }
+    }
+
+    #[inline(always)]
     unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         // SAFETY: the caller vouches for the features; the stores fill the rows of `range`.
         unsafe {
             let lanes = x86::lanes(slot, block);
             let limit = _mm256_set1_ps(slot.limit);
             let t_min = _mm256_set1_ps(slot.t_min);
-            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(lanes.low, lanes.minus_slack);
-            let outside =
-                _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GT_OQ>(lanes.high, lanes.slack));
-            let nearest = _mm256_sub_ps(lanes.near, lanes.blur);
-            let farthest = _mm256_add_ps(lanes.far, lanes.blur);
-            let meets = _mm256_and_ps(
-                _mm256_cmp_ps::<_CMP_LE_OQ>(nearest, limit),
-                _mm256_cmp_ps::<_CMP_GE_OQ>(farthest, t_min),
-            );
-            let meets = _mm256_andnot_ps(outside, meets);
+            let meets = meets(&lanes, limit, t_min);
             let (low, high) = x86::parameters(&lanes);
             _mm256_store_ps(range.low.as_mut_ptr(), low);
             _mm256_store_ps(range.high.as_mut_ptr(), high);
@@ -144,5 +145,23 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn prefetch(address: *const u8) {
         x86::prefetch(address);
+    }
+}
+
+/// Lanes that the ray may hit between `t_min` and `limit`, as a vector mask.
+#[inline(always)]
+unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> __m256 {
+    // SAFETY: the caller vouches for the features.
+    unsafe {
+        let below = _mm256_cmp_ps::<_CMP_LT_OQ>(lanes.low, lanes.minus_slack);
+        let outside = _mm256_and_ps(below, _mm256_cmp_ps::<_CMP_GT_OQ>(lanes.high, lanes.slack));
+        let nearest = _mm256_sub_ps(lanes.near, lanes.blur);
+        let farthest = _mm256_add_ps(lanes.far, lanes.blur);
+        let meets = _mm256_and_ps(
+            _mm256_cmp_ps::<_CMP_LE_OQ>(nearest, limit),
+            _mm256_cmp_ps::<_CMP_GE_OQ>(farthest, t_min),
+        );
+        let meets = _mm256_andnot_ps(outside, meets);
+        meets
     }
 }

@@ -4,8 +4,9 @@
 #![allow(unsafe_code)]
 
 use super::level::{Found, Nearest, Range, Root, Simd};
+use super::list::{List, Lists};
 use super::slot::{Loaded, Slot};
-use super::x86::{self, Children};
+use super::x86::{self, Children, Lanes};
 use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
 use std::arch::x86_64::*;
@@ -43,18 +44,51 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    unsafe fn add(lists: &mut Lists, moved: &List, n: usize) {
+        // SAFETY: the caller vouches for the features; a list has room for eight lanes more than
+        // there are slots.
+        unsafe {
+            let mut from = 0;
+            while from < n {
+                let used = ((1u32 << (n - from).min(8)) - 1) as u8;
+                let slot = _mm256_loadu_si256(moved.slot.as_ptr().add(from).cast());
+                let code = _mm256_loadu_si256(moved.code.as_ptr().add(from).cast());
+                let leaf = used & _mm256_movepi32_mask(code);
+                let ended = _mm256_mask_testn_epi32_mask(used, code, code);
+                let put = |list: &mut List, mask: u8| {
+                    let slot = _mm256_maskz_compress_epi32(mask, slot);
+                    let code = _mm256_maskz_compress_epi32(mask, code);
+                    let at = list.len & 31;
+                    _mm256_storeu_si256(list.slot.as_mut_ptr().add(at).cast(), slot);
+                    _mm256_storeu_si256(list.code.as_mut_ptr().add(at).cast(), code);
+                    list.len += mask.count_ones() as usize;
+                };
+                put(&mut lists.waiting, leaf);
+                put(&mut lists.stepping, used & !leaf & !ended);
+                put(&mut lists.free, ended);
+                from += 8;
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn meets(slot: &Slot, block: &Block) -> u32 {
+        // SAFETY: the caller vouches for the features.
+        unsafe {
+            let lanes = x86::lanes(slot, block);
+            let (limit, t_min) = (_mm256_set1_ps(slot.limit), _mm256_set1_ps(slot.t_min));
+            u32::from(meets(&lanes, limit, t_min))
+        }
+    }
+
+    #[inline(always)]
     unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         // SAFETY: the caller vouches for the features; the stores fill the rows of `range`.
         unsafe {
             let lanes = x86::lanes(slot, block);
             let limit = _mm256_set1_ps(slot.limit);
             let t_min = _mm256_set1_ps(slot.t_min);
-            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(lanes.low, lanes.minus_slack);
-            let outside = _mm256_mask_cmp_ps_mask::<_CMP_GT_OQ>(below, lanes.high, lanes.slack);
-            let nearest = _mm256_sub_ps(lanes.near, lanes.blur);
-            let farthest = _mm256_add_ps(lanes.far, lanes.blur);
-            let meets = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(!outside, nearest, limit);
-            let meets = _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(meets, farthest, t_min);
+            let meets = meets(&lanes, limit, t_min);
             let (low, high) = x86::parameters(&lanes);
             _mm256_store_ps(range.low.as_mut_ptr(), low);
             _mm256_store_ps(range.high.as_mut_ptr(), high);
@@ -103,5 +137,20 @@ impl Simd for Avx512 {
     #[inline(always)]
     unsafe fn prefetch(address: *const u8) {
         x86::prefetch(address);
+    }
+}
+
+/// Lanes that the ray may hit between `t_min` and `limit`.
+#[inline(always)]
+unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> u8 {
+    // SAFETY: the caller vouches for the features.
+    unsafe {
+        let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(lanes.low, lanes.minus_slack);
+        let outside = _mm256_mask_cmp_ps_mask::<_CMP_GT_OQ>(below, lanes.high, lanes.slack);
+        let nearest = _mm256_sub_ps(lanes.near, lanes.blur);
+        let farthest = _mm256_add_ps(lanes.far, lanes.blur);
+        let meets = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(!outside, nearest, limit);
+        let meets = _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(meets, farthest, t_min);
+        meets
     }
 }

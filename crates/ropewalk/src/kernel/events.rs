@@ -12,9 +12,12 @@ pub trait Events {
     /// A ray visits a leaf.
     #[inline(always)]
     fn leaf(&mut self) {}
-    /// A block is tested; so many of its lanes are hit for sure, so many are open.
+    /// A block is looked at.
     #[inline(always)]
-    fn block(&mut self, _clear: u32, _open: u32) {}
+    fn block(&mut self) {}
+    /// A block that the ray meets is tested in full: lanes hit for sure, and open ones.
+    #[inline(always)]
+    fn found(&mut self, _clear: u32, _open: u32) {}
 }
 
 /// No counters.
@@ -34,6 +37,8 @@ pub struct BatchEvents {
     pub leaves: u64,
     /// Blocks of eight primitives tested.
     pub blocks: u64,
+    /// Of these, blocks with a triangle that the ray may hit.
+    pub met: u64,
     /// Triangles hit for sure, as `f32` sees it.
     pub clear: u64,
     /// Triangles decided in `f64`; in addition each first hit takes its parameter from there.
@@ -50,8 +55,11 @@ impl Events for BatchEvents {
     fn leaf(&mut self) {
         self.leaves += 1;
     }
-    fn block(&mut self, clear: u32, open: u32) {
+    fn block(&mut self) {
         self.blocks += 1;
+    }
+    fn found(&mut self, clear: u32, open: u32) {
+        self.met += 1;
         self.clear += u64::from(clear.count_ones());
         self.open += u64::from(open.count_ones());
     }

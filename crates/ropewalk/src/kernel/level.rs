@@ -2,6 +2,7 @@
 
 #![allow(unsafe_code)]
 
+use super::list::{List, Lists};
 use super::slot::{LARGE, Loaded, Slot};
 use crate::aabb::Aabb;
 use crate::ray::Ray;
@@ -143,6 +144,21 @@ pub trait Simd: Copy {
     /// # Safety
     /// See the trait.
     unsafe fn step(slot: &mut Slot, treelet: &Treelet, sp: usize) -> usize;
+
+    /// [`Lists::add`].
+    ///
+    /// # Safety
+    /// See the trait.
+    #[inline(always)]
+    unsafe fn add(lists: &mut Lists, moved: &List, n: usize) {
+        lists.add(moved, n);
+    }
+
+    /// The lanes that [`Simd::test`] may find clear or open, and perhaps a few more.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn meets(slot: &Slot, block: &Block) -> u32;
 
     /// Tests the triangles of a block against the slot's ray, `t_min` and `limit`.
     ///

@@ -10,6 +10,7 @@ mod events;
 mod exact;
 mod extreme;
 mod level;
+mod list;
 mod query;
 mod scalar;
 mod slot;

@@ -51,6 +51,13 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
+    unsafe fn meets(slot: &Slot, block: &Block) -> u32 {
+        // SAFETY: portable code.
+        let found = unsafe { Self::test(slot, block, &mut Range::default()) };
+        found.clear | found.open
+    }
+
+    #[inline(always)]
     unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         let k = slot.k.map(|a| a as usize);
         let [sx, sy, sz] = slot.shear;

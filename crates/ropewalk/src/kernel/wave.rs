@@ -20,50 +20,19 @@ use super::events::Events;
 use super::exact::{Exact, place};
 use super::extreme;
 use super::level::{Found, Range, Root, Simd};
+use super::list::{List, Lists};
 use super::query::{BatchQuery, Clear};
 use super::slot::{Loaded, STACK, Slot, earlier};
 use crate::geometry::Geometry;
 use crate::ray::{PreparedRay, Ray};
-use crate::wide::{
-    BLOCK_LINES, Block, ID_MASK, LEAF, LINE, WIDTH, WideTree, code_line, code_offset,
-};
+use crate::wide::{BLOCK_LINES, Block, ID_MASK, LINE, WIDTH, WideTree, code_line, code_offset};
 
 /// Rays in flight on a core.
 pub const WAVE: usize = 24;
 
-/// Slots and the codes of the cells that their rays visit next; 32 entries, so that a masked index
-/// needs no bounds check.
-struct List {
-    slot: [u8; 32],
-    code: [u32; 32],
-    len: usize,
-}
-
-impl List {
-    const EMPTY: List = List { slot: [0; 32], code: [0; 32], len: 0 };
-
-    #[inline(always)]
-    fn push(&mut self, k: u8, code: u32) {
-        self.set(self.len, k, code);
-        self.len += 1;
-    }
-
-    /// Writes an entry without keeping it: no branch.
-    #[inline(always)]
-    fn set(&mut self, i: usize, k: u8, code: u32) {
-        self.slot[i & 31] = k;
-        self.code[i & 31] = code;
-    }
-
-    #[inline(always)]
-    fn get(&self, i: usize) -> (u8, u32) {
-        (self.slot[i & 31], self.code[i & 31])
-    }
-}
-
 /// Blocks to be tested, each with a number: how many of its leaf are left, or which lanes.
 struct Tests {
-    slot: [u8; 32],
+    slot: [u32; 32],
     line: [u32; 32],
     number: [u32; 32],
     len: usize,
@@ -73,22 +42,16 @@ impl Tests {
     const EMPTY: Tests = Tests { slot: [0; 32], line: [0; 32], number: [0; 32], len: 0 };
 
     #[inline(always)]
-    fn set(&mut self, i: usize, k: u8, line: u32, number: u32) {
+    fn set(&mut self, i: usize, k: u32, line: u32, number: u32) {
         self.slot[i & 31] = k;
         self.line[i & 31] = line;
         self.number[i & 31] = number;
     }
 
     #[inline(always)]
-    fn get(&self, i: usize) -> (u8, u32, u32) {
+    fn get(&self, i: usize) -> (u32, u32, u32) {
         (self.slot[i & 31], self.line[i & 31], self.number[i & 31])
     }
-}
-
-/// Slots without a ray.
-struct Free {
-    slot: [u8; 32],
-    len: usize,
 }
 
 /// A batch on its way.
@@ -101,9 +64,9 @@ struct Wave<'a, Q, E> {
     query: &'a mut Q,
     events: &'a mut E,
     next: usize,
-    stepping: List,
-    waiting: List,
-    free: Free,
+    lists: Lists,
+    /// Rays with the cells that they go to, before they are put on the lists.
+    moved: List,
 }
 
 /// Runs a batch through `slots.len()` slots, [`WAVE`] at most.
@@ -126,10 +89,10 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
     }
     let width = slots.len().min(WAVE);
     let slots = &mut slots[..width];
-    let (stepping, waiting) = (List::EMPTY, List::EMPTY);
     let exact = Exact { lines: tree.lines(), rays };
     let root = Root::new(tree.bounds(), tree.root());
-    let free = Free { slot: std::array::from_fn(|k| k as u8), len: width };
+    let mut lists = Lists { stepping: List::EMPTY, waiting: List::EMPTY, free: List::EMPTY };
+    (0..width as u32).for_each(|k| lists.free.push(k, 0));
     let mut wave = Wave {
         tree,
         geometry,
@@ -139,22 +102,21 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
         query,
         events,
         next: 0,
-        stepping,
-        waiting,
-        free,
+        lists,
+        moved: List::EMPTY,
     };
     loop {
         // SAFETY: passed on to the caller.
         unsafe { wave.refill::<L>() };
-        while wave.free.len == 0 || wave.next == rays.len() {
-            if wave.stepping.len + wave.waiting.len == 0 {
+        while wave.lists.free.len == 0 || wave.next == rays.len() {
+            if wave.lists.stepping.len + wave.lists.waiting.len == 0 {
                 wave.query.end(&exact);
                 return;
             }
             // SAFETY: passed on to the caller.
             unsafe {
                 wave.step_phase::<L>();
-                if wave.waiting.len * 2 >= width || wave.stepping.len == 0 {
+                if wave.lists.waiting.len * 2 >= width || wave.lists.stepping.len == 0 {
                     wave.leaf_phase::<L, SHAPES>();
                 }
             }
@@ -171,39 +133,40 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
     unsafe fn step_phase<L: Simd>(&mut self) {
         let slots = self.slots.as_mut_ptr();
         let lines = self.tree.lines().as_ptr();
-        let n = self.stepping.len;
+        let n = std::mem::take(&mut self.lists.stepping.len);
         for i in 0..n {
-            let (k, code) = self.stepping.get(i);
+            let (k, code) = self.lists.stepping.get(i);
             self.events.step();
             // SAFETY: lists hold numbers of slots and codes of the tree, whose links are valid.
             unsafe {
                 let slot = &mut *slots.add(k as usize);
-                let sp = slot.sp as usize;
                 let treelet = &*lines.add(code_offset(code)).cast();
-                slot.sp = L::step(slot, treelet, sp) as u32;
+                let sp = L::step(slot, treelet, slot.sp as usize);
+                slot.sp = sp as u32;
+                self.moved.set(i, k, *slot.code.get_unchecked(sp));
             }
         }
-        let (mut stepping, before) = (0, self.waiting.len);
-        let mut waiting = before;
-        for i in 0..n {
-            let (k, _) = self.stepping.get(i);
-            // SAFETY: as above; the stack pointer stays on the stack.
-            let code = unsafe {
-                let slot = &*slots.add(k as usize);
-                *slot.code.get_unchecked(slot.sp as usize)
-            };
-            let leaf = (code >> 31) as usize;
-            // SAFETY: passed on to the caller.
-            unsafe { L::prefetch(self.address(code)) };
-            self.waiting.set(waiting, k, code);
-            self.stepping.set(stepping, k, code);
-            waiting += leaf;
-            stepping += 1 - leaf;
-        }
-        self.stepping.len = stepping;
-        self.waiting.len = waiting;
         // SAFETY: passed on to the caller.
-        unsafe { self.prefetch_blocks::<L>(before) };
+        unsafe { self.enlist::<L>(n) };
+    }
+
+    /// Puts the first `n` moved rays on the lists of their kinds and asks for their cells.
+    #[inline(always)]
+    unsafe fn enlist<L: Simd>(&mut self, n: usize) {
+        let waiting = self.lists.waiting.len;
+        // SAFETY: passed on to the caller.
+        unsafe {
+            for i in 0..n {
+                L::prefetch(self.address(self.moved.get(i).1));
+            }
+            L::add(&mut self.lists, &self.moved, n);
+            for i in waiting..self.lists.waiting.len {
+                let block = self.address(self.lists.waiting.get(i).1);
+                for line in 1..BLOCK_LINES {
+                    L::prefetch(block.wrapping_add(line * LINE));
+                }
+            }
+        }
     }
 
     /// Where a cell lies in memory.
@@ -212,64 +175,29 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
         self.tree.lines().as_ptr().wrapping_add(code_offset(code))
     }
 
-    /// Asks for the first blocks of the waiting rays from entry `from` on.
-    #[inline(always)]
-    unsafe fn prefetch_blocks<L: Simd>(&self, from: usize) {
-        for i in from..self.waiting.len {
-            let block = self.address(self.waiting.get(i).1);
-            for line in 1..BLOCK_LINES {
-                // SAFETY: passed on to the caller.
-                unsafe { L::prefetch(block.wrapping_add(line * LINE)) };
-            }
-        }
-    }
-
-    /// Puts slot `k`, whose next cell is `code`, on the list of its kind.
-    #[inline(always)]
-    unsafe fn enlist<L: Simd>(&mut self, k: u8, code: u32) {
-        // SAFETY: passed on to the caller.
-        unsafe { L::prefetch(self.address(code)) };
-        if code & LEAF != 0 {
-            self.waiting.push(k, code);
-        } else {
-            self.stepping.push(k, code);
-        }
-    }
-
     /// Every waiting ray tests its leaf and goes on, or makes room for the next ray.
     #[inline(always)]
     unsafe fn leaf_phase<L: Simd, const SHAPES: bool>(&mut self) {
-        let n = std::mem::take(&mut self.waiting.len);
+        let n = std::mem::take(&mut self.lists.waiting.len);
         // SAFETY: passed on to the caller.
         unsafe { self.test_leaves::<L, SHAPES>(n) };
-        let (mut waiting, mut stepping) = (0, self.stepping.len);
-        let mut free = 0;
         for i in 0..n {
-            let (k, _) = self.waiting.get(i);
+            let (k, _) = self.lists.waiting.get(i);
             // SAFETY: lists hold numbers of slots; the stack pointer stays on the stack.
-            let (ended, code) = unsafe {
+            unsafe {
                 let slot = &mut *self.slots.as_mut_ptr().add(k as usize);
                 let ended = Self::pop(slot);
-                (ended, *slot.code.get_unchecked(slot.sp as usize))
-            };
-            let leaf = (code >> 31) as usize;
-            // SAFETY: passed on to the caller.
-            unsafe { L::prefetch(self.address(code)) };
-            self.free.slot[free & 31] = k;
-            self.waiting.set(waiting, k, code);
-            self.stepping.set(stepping, k, code);
-            free += usize::from(ended);
-            waiting += leaf & usize::from(!ended);
-            stepping += (1 - leaf) & usize::from(!ended);
+                let code = *slot.code.get_unchecked(slot.sp as usize);
+                self.moved.set(i, k, std::hint::select_unpredictable(ended, 0, code));
+            }
         }
-        self.stepping.len = stepping;
-        self.waiting.len = waiting;
-        self.free.len = free;
-        for &k in &self.free.slot[..free & 31] {
+        let free = self.lists.free.len;
+        // SAFETY: passed on to the caller.
+        unsafe { self.enlist::<L>(n) };
+        for i in free..self.lists.free.len {
+            let (k, _) = self.lists.free.get(i);
             self.query.finish(k as usize, &mut self.slots[k as usize], &self.exact);
         }
-        // SAFETY: passed on to the caller.
-        unsafe { self.prefetch_blocks::<L>(0) };
     }
 
     /// Takes the cell just visited off the stack; true if nothing is left that matters.
@@ -292,11 +220,14 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
 
     /// Tests the leaves of the first `n` waiting rays: all first blocks, all second blocks, and so
     /// on, so that no test waits for the outcome of the one before.
+    ///
+    /// Each block is only looked at first; few of them hold a triangle that the ray may hit, and
+    /// those are tested again in full.
     #[inline(always)]
     unsafe fn test_leaves<L: Simd, const SHAPES: bool>(&mut self, n: usize) {
         let mut tests = Tests::EMPTY;
         for i in 0..n {
-            let (k, code) = self.waiting.get(i);
+            let (k, code) = self.lists.waiting.get(i);
             let count = self.tree.block_count(code);
             tests.set(tests.len, k, code_line(code) as u32, count);
             tests.len += usize::from(count > 0);
@@ -306,13 +237,13 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
         }
         while tests.len > 0 {
             let n = std::mem::take(&mut tests.len);
-            let (mut open, mut unsettled) = (Tests::EMPTY, 0);
+            let (mut met, mut meeting) = (Tests::EMPTY, 0);
             for i in 0..n {
                 let (k, line, left) = tests.get(i);
                 // SAFETY: the codes of a tree lead to its blocks; the rest passed on to the caller.
-                let lanes = unsafe { self.test_block::<L, SHAPES>(k, line as usize) };
-                open.set(unsettled, k, line, lanes);
-                unsettled += usize::from(lanes != 0);
+                let lanes = unsafe { self.meet_block::<L, SHAPES>(k, line as usize) };
+                met.set(meeting, k, line, lanes);
+                meeting += usize::from(lanes != 0);
                 tests.set(tests.len, k, line + BLOCK_LINES as u32, left - 1);
                 tests.len += usize::from(left > 1);
             }
@@ -324,6 +255,14 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
                     unsafe { L::prefetch(block.wrapping_add(line * LINE)) };
                 }
             }
+            let (mut open, mut unsettled) = (Tests::EMPTY, 0);
+            for i in 0..meeting {
+                let (k, line, lanes) = met.get(i);
+                // SAFETY: as above.
+                let lanes = unsafe { self.test_block::<L>(k, line as usize, lanes) };
+                open.set(unsettled, k, line, lanes);
+                unsettled += usize::from(lanes != 0);
+            }
             for i in 0..unsettled {
                 let (k, line, lanes) = open.get(i);
                 self.decide(k, line as usize, lanes);
@@ -331,28 +270,41 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
         }
     }
 
-    /// Tests a block against the ray of slot `k`; the lanes that need a decision in `f64`.
+    /// The lanes of a block that the ray of slot `k` may hit: triangles in bits 7..0, others in
+    /// bits 15..8.
+    #[inline(always)]
+    unsafe fn meet_block<L: Simd, const SHAPES: bool>(&mut self, k: u32, line: usize) -> u32 {
+        // SAFETY: the caller vouches for the slot, the line and the features.
+        unsafe {
+            let slot = &*self.slots.as_ptr().add(k as usize);
+            let block = &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>();
+            let lanes = L::meets(slot, block);
+            self.events.block();
+            if SHAPES { lanes | block.shape_lanes() << WIDTH } else { lanes }
+        }
+    }
+
+    /// Tests a block that the ray of slot `k` meets; the lanes that need a decision in `f64`.
     ///
     /// No branches: which blocks hold a hit cannot be predicted, and a wrong guess would cost more
     /// than a test.
     #[inline(always)]
-    unsafe fn test_block<L: Simd, const SHAPES: bool>(&mut self, k: u8, line: usize) -> u32 {
+    unsafe fn test_block<L: Simd>(&mut self, k: u32, line: usize, lanes: u32) -> u32 {
         // SAFETY: the caller vouches for the slot, the line and the features.
         unsafe {
             let slot = &mut *self.slots.as_mut_ptr().add(k as usize);
             let block = &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>();
             let mut range = Range::default();
             let Found { clear, open } = L::test(slot, block, &mut range);
-            self.events.block(clear, open);
+            self.events.found(clear, open);
             let hits = Clear { lanes: clear, range: &range, block, line };
-            let open = open | self.query.take_clear::<L>(slot, &hits);
-            if SHAPES { open | block.shape_lanes() << WIDTH } else { open }
+            open | self.query.take_clear::<L>(slot, &hits) | lanes >> WIDTH << WIDTH
         }
     }
 
     /// Decides the lanes of a block exactly: triangles in bits 7..0, others in bits 15..8.
     #[cold]
-    fn decide(&mut self, k: u8, line: usize, mut lanes: u32) {
+    fn decide(&mut self, k: u32, line: usize, mut lanes: u32) {
         if lanes >> WIDTH != 0 {
             self.test_shapes(k, line);
             lanes &= (1 << WIDTH) - 1;
@@ -368,7 +320,7 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
     }
 
     /// Tests the primitives of a block that are no triangles.
-    fn test_shapes(&mut self, k: u8, line: usize) {
+    fn test_shapes(&mut self, k: u32, line: usize) {
         let slot = &mut self.slots[k as usize];
         let block = self.tree.lines().block(line);
         // `load` has refused what cannot be prepared.
@@ -386,27 +338,30 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
     /// Puts the next rays that reach the scene's box into the free slots.
     #[inline(always)]
     unsafe fn refill<L: Simd>(&mut self) {
-        while self.free.len > 0 && self.next < self.exact.rays.len() {
-            let (index, k) = (self.next, self.free.slot[(self.free.len - 1) & 31]);
+        let mut n = 0;
+        while self.lists.free.len > 0 && self.next < self.exact.rays.len() {
+            let (index, k) = (self.next, self.lists.free.get(self.lists.free.len - 1).0);
             self.next += 1;
             let (ray, slot) = (&self.exact.rays[index], &mut self.slots[k as usize]);
             // SAFETY: passed on to the caller.
             match unsafe { L::load(slot, ray, index as u32, &self.root) } {
                 Loaded::Ready => {
                     self.events.ray();
-                    self.free.len -= 1;
-                    // SAFETY: passed on to the caller.
-                    unsafe { self.enlist::<L>(k, self.root.code) };
+                    self.lists.free.len -= 1;
+                    self.moved.set(n, k, self.root.code);
+                    n += 1;
                 }
                 Loaded::Misses => self.query.miss(index),
                 Loaded::Extreme => self.walk_extreme(k),
             }
         }
+        // SAFETY: passed on to the caller.
+        unsafe { self.enlist::<L>(n) };
     }
 
     /// Answers the ray of slot `k` without the filters.
     #[cold]
-    fn walk_extreme(&mut self, k: u8) {
+    fn walk_extreme(&mut self, k: u32) {
         let slot = &mut self.slots[k as usize];
         extreme::walk(self.tree, self.geometry, &self.exact, (k as usize, slot), self.query);
         self.query.finish(k as usize, slot, &self.exact);
