@@ -161,7 +161,6 @@ unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> __m256 {
             _mm256_cmp_ps::<_CMP_LE_OQ>(nearest, limit),
             _mm256_cmp_ps::<_CMP_GE_OQ>(farthest, t_min),
         );
-        let meets = _mm256_andnot_ps(outside, meets);
-        meets
+        _mm256_andnot_ps(outside, meets)
     }
 }

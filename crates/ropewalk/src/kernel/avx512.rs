@@ -150,7 +150,6 @@ unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> u8 {
         let nearest = _mm256_sub_ps(lanes.near, lanes.blur);
         let farthest = _mm256_add_ps(lanes.far, lanes.blur);
         let meets = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(!outside, nearest, limit);
-        let meets = _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(meets, farthest, t_min);
-        meets
+        _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(meets, farthest, t_min)
     }
 }

@@ -4,7 +4,7 @@
 
 use super::events::{BatchEvents, Events, NoEvents};
 use super::level::Level;
-use super::query::{Any, BatchQuery, Closest, Every};
+use super::query::{Any, BatchQuery, Closest, Count, Every, Filtered, HitFilter, NoFilter};
 use super::slot::Slot;
 use super::wave::{WAVE, wave};
 use crate::geometry::Geometry;
@@ -38,17 +38,28 @@ pub struct AllHits {
 
 /// Answers batches of rays over a wide tree.
 #[derive(Clone, Copy)]
-pub struct BatchCaster<'a> {
+pub struct BatchCaster<'a, F = NoFilter> {
     tree: &'a WideTree,
     geometry: &'a Geometry,
     level: Level,
     threads: usize,
+    filter: F,
 }
 
 impl<'a> BatchCaster<'a> {
     /// A caster at the best level of this machine, on all threads of the current rayon pool.
     pub fn new(tree: &'a WideTree, geometry: &'a Geometry) -> Self {
-        BatchCaster { tree, geometry, level: Level::best(), threads: 0 }
+        BatchCaster { tree, geometry, level: Level::best(), threads: 0, filter: NoFilter }
+    }
+}
+
+impl<'a, F: HitFilter> BatchCaster<'a, F> {
+    /// The same with a filter that decides which hits count: a closure of the ray's index in the
+    /// batch and the hit, or [`Masks`](super::Masks) or [`Opacity`](super::Opacity) from arrays. It
+    /// runs inside the traversal; see [`HitFilter`] for what it may rely on.
+    pub fn with_filter<G: HitFilter>(self, filter: G) -> BatchCaster<'a, G> {
+        let BatchCaster { tree, geometry, level, threads, .. } = self;
+        BatchCaster { tree, geometry, level, threads, filter }
     }
 
     /// The same with another level, or `None` if this machine lacks it.
@@ -80,11 +91,11 @@ impl<'a> BatchCaster<'a> {
     pub fn closest_hit_into(&self, rays: &[Ray], t: &mut [f32], prim_id: &mut [u32]) {
         assert!(t.len() == rays.len() && prim_id.len() == rays.len(), "one entry a ray");
         if self.is_serial(rays) {
-            return self.run(rays, &mut Closest::new(t, prim_id));
+            return self.run(rays, 0, Closest::new(t, prim_id), |_| ());
         }
         let chunks = t.par_chunks_mut(TASK).zip(prim_id.par_chunks_mut(TASK));
-        rays.par_chunks(TASK).zip(chunks).for_each(|(rays, (t, prim))| {
-            self.run(rays, &mut Closest::new(t, prim));
+        rays.par_chunks(TASK).zip(chunks).enumerate().for_each(|(i, (rays, (t, prim)))| {
+            self.run(rays, i * TASK, Closest::new(t, prim), |_| ());
         });
     }
 
@@ -102,11 +113,26 @@ impl<'a> BatchCaster<'a> {
     pub fn occluded_into(&self, rays: &[Ray], hit: &mut [bool]) {
         assert!(hit.len() == rays.len(), "one entry a ray");
         if self.is_serial(rays) {
-            return self.run(rays, &mut Any { hit });
+            return self.run(rays, 0, Any { hit }, |_| ());
         }
-        rays.par_chunks(TASK).zip(hit.par_chunks_mut(TASK)).for_each(|(rays, hit)| {
-            self.run(rays, &mut Any { hit });
+        let chunks = rays.par_chunks(TASK).zip(hit.par_chunks_mut(TASK));
+        chunks.enumerate().for_each(|(i, (rays, hit))| {
+            self.run(rays, i * TASK, Any { hit }, |_| ());
         });
+    }
+
+    /// The number of primitives that each ray hits.
+    pub fn count_hits(&self, rays: &[Ray]) -> Vec<u32> {
+        let mut counts = vec![0; rays.len()];
+        if self.is_serial(rays) {
+            self.run(rays, 0, Count::new(&mut counts, WAVE), |_| ());
+            return counts;
+        }
+        let chunks = rays.par_chunks(TASK).zip(counts.par_chunks_mut(TASK));
+        chunks.enumerate().for_each(|(i, (rays, counts))| {
+            self.run(rays, i * TASK, Count::new(counts, WAVE), |_| ());
+        });
+        counts
     }
 
     /// All hits of each ray, in order, each once.
@@ -116,22 +142,16 @@ impl<'a> BatchCaster<'a> {
 
     /// The first `k` hits of each ray, in order, each once.
     pub fn first_hits(&self, rays: &[Ray], k: usize) -> AllHits {
-        let gather = |rays: &[Ray]| {
-            let mut every = Every {
-                first: k,
-                found: vec![Vec::new(); WAVE],
-                done: Vec::new(),
-                range: vec![(0, 0); rays.len()],
-            };
-            if k > 0 {
-                self.run(rays, &mut every);
-            }
-            every
+        if k == 0 {
+            return AllHits { offsets: vec![0; rays.len() + 1], ..AllHits::default() };
+        }
+        let gather = |(i, rays): (usize, &[Ray])| {
+            self.run(rays, i * TASK, Every::new(k, rays.len(), WAVE), |every| every)
         };
         let parts: Vec<Every> = if self.is_serial(rays) {
-            vec![gather(rays)]
+            vec![gather((0, rays))]
         } else {
-            rays.par_chunks(TASK).map(gather).collect()
+            rays.par_chunks(TASK).enumerate().map(gather).collect()
         };
         let total = parts.iter().map(|p| p.done.len()).sum();
         let mut all = AllHits {
@@ -171,8 +191,17 @@ impl<'a> BatchCaster<'a> {
         self.threads == 1 || rays.len() <= TASK
     }
 
-    fn run<Q: BatchQuery>(&self, rays: &[Ray], query: &mut Q) {
-        self.run_counted(rays, query, &mut NoEvents);
+    /// Puts `rays`, the first of which is `first_ray` in the batch, to `query`.
+    fn run<Q: BatchQuery, T>(
+        &self,
+        rays: &[Ray],
+        first_ray: usize,
+        query: Q,
+        answer: impl FnOnce(Q) -> T,
+    ) -> T {
+        let mut filtered = Filtered { query, filter: &self.filter, first_ray };
+        self.run_counted(rays, &mut filtered, &mut NoEvents);
+        answer(filtered.query)
     }
 
     fn run_counted<Q: BatchQuery, E: Events>(&self, rays: &[Ray], query: &mut Q, events: &mut E) {

@@ -20,3 +20,4 @@ mod x86;
 pub use batch::{AllHits, BatchCaster, BatchHit};
 pub use events::BatchEvents;
 pub use level::Level;
+pub use query::{HitFilter, Masks, NoFilter, Opacity};

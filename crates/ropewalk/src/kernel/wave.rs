@@ -298,7 +298,8 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
             let Found { clear, open } = L::test(slot, block, &mut range);
             self.events.found(clear, open);
             let hits = Clear { lanes: clear, range: &range, block, line };
-            open | self.query.take_clear::<L>(slot, &hits) | lanes >> WIDTH << WIDTH
+            open | self.query.take_clear::<L>(k as usize, slot, &hits, &self.exact)
+                | lanes >> WIDTH << WIDTH
         }
     }
 

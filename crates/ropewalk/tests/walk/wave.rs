@@ -2,13 +2,13 @@
 
 use crate::bench::{Bench, coordinates};
 use crate::scenes;
-use ropewalk::kernel::{AllHits, BatchCaster, Level};
+use ropewalk::kernel::{AllHits, BatchCaster, HitFilter, Level, Masks, Opacity};
 use ropewalk::primitive::Triangle;
 use ropewalk::ray::PreparedRay;
 use ropewalk::traverse::{BruteForce, NoCounts, RayCaster};
 use ropewalk::tree::{BspTree, Node};
 use ropewalk::wide::WideTree;
-use ropewalk::{Geometry, Ray, Shape};
+use ropewalk::{Geometry, Hit, Ray, Shape};
 use ropewalk_testkit::rays::{Draw, aligned_ray, generic_ray, grid_ray, invalid_rays};
 use ropewalk_testkit::trees::{TreeShape, random_tree};
 
@@ -33,6 +33,7 @@ fn check(geometry: &Geometry, tree: &BspTree, rays: &[Ray]) {
         let level = level.name();
         let (hits, occluded) = (caster.closest_hit(rays), caster.occluded(rays));
         let (all, first) = (caster.all_hits(rays), caster.first_hits(rays, 3));
+        let counts = caster.count_hits(rays);
         for (i, ray) in rays.iter().enumerate() {
             let expected = closest[i].map_or((f32::INFINITY, u32::MAX), |h| (h.t, h.prim_id));
             assert_eq!((hits.t[i], hits.prim_id[i]), expected, "{level} closest, {ray:?}");
@@ -43,6 +44,7 @@ fn check(geometry: &Geometry, tree: &BspTree, rays: &[Ray]) {
                 of.t[range].iter().copied().zip(ids).collect::<Vec<_>>()
             };
             assert_eq!(row(&all), every[i], "{level} all hits, {ray:?}");
+            assert_eq!(counts[i] as usize, every[i].len(), "{level} count, {ray:?}");
             let three = &every[i][..every[i].len().min(3)];
             assert_eq!(row(&first), three, "{level} first hits, {ray:?}");
         }
@@ -148,6 +150,78 @@ fn leaves_of_more_blocks_than_a_code_can_count() {
         let rays: Vec<_> = (0..100).map(|_| generic_ray(&mut draw, &bounds)).collect();
         check(&geometry, &tree, &rays);
     }
+}
+
+/// Filters by a closure, by masks and by opacity: every query answers as if the refused hits were not
+/// there, on one thread and on all.
+#[test]
+fn filters_see_every_hit_that_matters() {
+    let mut draw = Draw::new(12);
+    let geometry = scenes::mixed(&mut draw, 200, false);
+    let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+    let wide = WideTree::compile(&tree, &geometry).unwrap();
+    let rays: Vec<_> = (0..6000).map(|_| generic_ray(&mut draw, &geometry.bounds())).collect();
+    let word = |d: &mut Draw| 1u32 << d.below(3);
+    let primitive: Vec<u32> = (0..geometry.len()).map(|_| word(&mut draw)).collect();
+    let ray: Vec<u32> = rays.iter().map(|_| word(&mut draw) | word(&mut draw)).collect();
+    let opacity: Vec<f32> = (0..geometry.len()).map(|_| draw.uniform(0.0, 1.0) as f32).collect();
+
+    fn check(
+        (wide, geometry): (&WideTree, &Geometry),
+        rays: &[Ray],
+        filter: impl HitFilter + Copy,
+    ) -> usize {
+        let mut refused = 0;
+        for level in Level::ALL {
+            let caster = BatchCaster::new(wide, geometry).with_filter(filter);
+            let Some(caster) = caster.with_level(level) else { continue };
+            let serial = caster.with_threads(1);
+            let (hits, all) = (caster.closest_hit(rays), caster.all_hits(rays));
+            assert_eq!(hits, serial.closest_hit(rays));
+            assert_eq!(all, serial.all_hits(rays));
+            let (occluded, counts) = (caster.occluded(rays), caster.count_hits(rays));
+            for (i, ray) in rays.iter().enumerate() {
+                let Some(prepared) = PreparedRay::new(ray) else { continue };
+                let prims = 0..geometry.len() as u32;
+                let mut every: Vec<_> =
+                    prims.filter_map(|id| geometry.intersect(id, &prepared)).collect();
+                let whole = every.len();
+                every.retain(|hit| filter.accepts(i, hit));
+                refused += whole - every.len();
+                every.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.prim_id.cmp(&b.prim_id)));
+                let first = every.first().map_or((f32::INFINITY, u32::MAX), |h| (h.t, h.prim_id));
+                assert_eq!((hits.t[i], hits.prim_id[i]), first);
+                assert_eq!(occluded[i], !every.is_empty());
+                assert_eq!(counts[i] as usize, every.len());
+                let ids: Vec<_> = every.iter().map(|h| h.prim_id).collect();
+                assert_eq!(all.prim_id[all.offsets[i]..all.offsets[i + 1]], ids);
+            }
+        }
+        refused
+    }
+    let scene = (&wide, &geometry);
+    let refused = [
+        check(scene, &rays, |ray: usize, hit: &Hit| {
+            !(ray + hit.prim_id as usize).is_multiple_of(3)
+        }),
+        check(scene, &rays, |_: usize, hit: &Hit| hit.u < 0.5),
+        check(scene, &rays, Masks { primitive: &primitive, ray: &ray }),
+        check(scene, &rays, Opacity { primitive: &opacity, seed: 7 }),
+    ];
+    assert!(refused.iter().all(|&n| n > 300), "{refused:?}");
+}
+
+#[test]
+fn opacity_is_a_probability() {
+    let opacity = [0.0, 0.25, 1.0];
+    let filter = Opacity { primitive: &opacity, seed: 1 };
+    let share = |prim_id| {
+        let hit = Hit { t: 1.0, prim_id, u: 0.0, v: 0.0 };
+        (0..10_000).filter(|&ray| filter.accepts(ray, &hit)).count()
+    };
+    assert_eq!((share(0), share(2), share(3)), (0, 10_000, 10_000));
+    // Five standard deviations of a binomial draw.
+    assert!(share(1).abs_diff(2500) < 217, "{}", share(1));
 }
 
 #[test]

@@ -1,0 +1,116 @@
+//! The first hit of each ray.
+
+#![allow(unsafe_code)]
+
+use super::{BatchQuery, Clear};
+use crate::kernel::exact::{At, Exact, place};
+use crate::kernel::level::Simd;
+use crate::kernel::slot::Slot;
+use crate::ray::Hit;
+use crate::wide::ID_MASK;
+
+/// The first hit; ties to the lowest primitive.
+pub struct Closest<'a> {
+    t: &'a mut [f32],
+    prim: &'a mut [u32],
+    /// Finished rays whose hit is known but not its exact parameter, and where it lies.
+    pending: [(u32, At); PENDING],
+    count: usize,
+}
+
+/// Exact parameters are worked out for so many rays at once: these do not wait for each other.
+const PENDING: usize = 32;
+
+impl<'a> Closest<'a> {
+    /// Hits go to `t`, infinite for a miss, and `prim`, `u32::MAX` for a miss.
+    pub fn new(t: &'a mut [f32], prim: &'a mut [u32]) -> Self {
+        Closest { t, prim, pending: [(0, 0); PENDING], count: 0 }
+    }
+
+    /// Finds the exact parameter of the best hit so far.
+    #[cold]
+    fn settle(slot: &mut Slot, exact: &Exact<'_>) {
+        if slot.best_at != u32::MAX
+            && let Some(hit) = exact.hit(slot.ray, slot.best_at)
+        {
+            debug_assert!(slot.best_low <= hit.t && hit.t <= slot.limit);
+            slot.set_best(hit.t, hit.prim_id);
+        }
+    }
+
+    #[inline(always)]
+    fn settle_pending(&mut self, exact: &Exact<'_>) {
+        for &(ray, at) in &self.pending[..self.count] {
+            let hit = exact.hit(ray, at);
+            debug_assert!(hit.is_some(), "a clear hit is a hit");
+            let (t, prim) = hit.map_or((f32::INFINITY, u32::MAX), |hit| (hit.t, hit.prim_id));
+            self.t[ray as usize] = t;
+            self.prim[ray as usize] = prim;
+        }
+        self.count = 0;
+    }
+}
+
+impl BatchQuery for Closest<'_> {
+    const ANY: bool = false;
+
+    #[inline(always)]
+    unsafe fn take_clear<L: Simd>(
+        &mut self,
+        _k: usize,
+        slot: &mut Slot,
+        hits: &Clear<'_>,
+        _exact: &Exact<'_>,
+    ) -> u32 {
+        // SAFETY: passed on to the caller.
+        let (nearest, others) =
+            unsafe { (L::nearest(hits.lanes, hits.range), L::others(hits.block, slot.best_id)) };
+        // Without branches, since whether a block holds a nearer hit cannot be predicted.
+        let nearer = nearest.high < slot.best_low;
+        let unclear = if nearer { nearest.rivals } else { hits.lanes & others };
+        let nearer = nearer & (unclear == 0);
+        let select = std::hint::select_unpredictable::<u32>;
+        let lane = nearest.lane;
+        slot.limit = f32::from_bits(select(nearer, nearest.high.to_bits(), slot.limit.to_bits()));
+        let low = hits.range.low[lane].to_bits();
+        slot.best_low = f32::from_bits(select(nearer, low, slot.best_low.to_bits()));
+        slot.best_id = select(nearer, hits.block.id[lane] & ID_MASK, slot.best_id);
+        slot.best_at = select(nearer, place(hits.line, lane), slot.best_at);
+        if unclear == 0 { 0 } else { hits.lanes }
+    }
+
+    #[inline(always)]
+    fn take(&mut self, _k: usize, slot: &mut Slot, hit: &Hit, exact: &Exact<'_>) {
+        if hit.t > slot.limit {
+            return;
+        }
+        if hit.t >= slot.best_low {
+            Self::settle(slot, exact);
+        }
+        if hit.t < slot.limit || (hit.t == slot.limit && hit.prim_id < slot.best_id) {
+            slot.set_best(hit.t, hit.prim_id);
+        }
+    }
+
+    #[inline(always)]
+    fn finish(&mut self, _k: usize, slot: &mut Slot, exact: &Exact<'_>) {
+        let hit = slot.best_id != u32::MAX;
+        self.t[slot.ray as usize] = if hit { slot.limit } else { f32::INFINITY };
+        self.prim[slot.ray as usize] = slot.best_id;
+        self.pending[self.count % PENDING] = (slot.ray, slot.best_at);
+        self.count += usize::from(slot.best_at != u32::MAX);
+        if self.count == PENDING {
+            self.settle_pending(exact);
+        }
+    }
+
+    fn miss(&mut self, index: usize) {
+        self.t[index] = f32::INFINITY;
+        self.prim[index] = u32::MAX;
+    }
+
+    #[inline(always)]
+    fn end(&mut self, exact: &Exact<'_>) {
+        self.settle_pending(exact);
+    }
+}

@@ -1,0 +1,65 @@
+//! What a batch looks for. A query sees hits and lowers the slot's limit.
+
+#![allow(unsafe_code)]
+
+mod any;
+mod closest;
+mod count;
+mod every;
+mod filtered;
+
+pub use any::Any;
+pub use closest::Closest;
+pub use count::Count;
+pub use every::Every;
+pub use filtered::{Filtered, HitFilter, Masks, NoFilter, Opacity};
+
+use super::exact::Exact;
+use super::level::{Range, Simd};
+use super::slot::Slot;
+use crate::ray::Hit;
+use crate::wide::Block;
+
+/// The lanes of a block that the filter is sure of: each is hit at a parameter in `range`, all of
+/// which the ray accepts.
+pub struct Clear<'a> {
+    /// The lanes.
+    pub lanes: u32,
+    /// Bounds of the parameters.
+    pub range: &'a Range,
+    /// The block.
+    pub block: &'a Block,
+    /// The line at which it lies.
+    pub line: usize,
+}
+
+/// A question asked of every ray of a batch.
+pub trait BatchQuery {
+    /// True if the first hit ends a ray.
+    const ANY: bool;
+
+    /// Takes hits whose exact parameters may not matter for the slot numbered `k`; the lanes for which
+    /// they do are returned and come again by [`BatchQuery::take`].
+    ///
+    /// # Safety
+    /// The machine must have the features of `L`, and the caller must enable them.
+    unsafe fn take_clear<L: Simd>(
+        &mut self,
+        k: usize,
+        slot: &mut Slot,
+        hits: &Clear<'_>,
+        exact: &Exact<'_>,
+    ) -> u32;
+
+    /// Takes a hit in the ray's range for the slot numbered `k`.
+    fn take(&mut self, k: usize, slot: &mut Slot, hit: &Hit, exact: &Exact<'_>);
+
+    /// The ray of slot `k` has seen every cell that matters.
+    fn finish(&mut self, k: usize, slot: &mut Slot, exact: &Exact<'_>);
+
+    /// Ray `index` misses the scene's box or is invalid.
+    fn miss(&mut self, index: usize);
+
+    /// No more rays come.
+    fn end(&mut self, _exact: &Exact<'_>) {}
+}
