@@ -9,6 +9,7 @@ use ropewalk::build::{
 use ropewalk::cost::LeafCost;
 use ropewalk::primitive::{Primitive, Sphere, Triangle};
 use ropewalk::tree::{BspTree, NodeKind, TreeStats};
+use ropewalk::wide::{Block, WideTree};
 use ropewalk::{Geometry, Sides};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -180,6 +181,32 @@ fn presets_do_not_depend_on_the_number_of_threads() {
         assert!(one.0 == two.0 && one.0 == five.0, "{preset:?}");
         assert_eq!((one.1.stops, &one.1.tree), (five.1.stops, &five.1.tree));
     }
+}
+
+#[test]
+fn the_wide_tree_is_that_of_the_binary_one_for_any_number_of_threads() {
+    let mut geometry = soup(20_000);
+    for has_shapes in [false, true] {
+        if has_shapes {
+            geometry.push(Sphere { center: [0.5; 3], radius: 0.1 }, Sides::Front).unwrap();
+        }
+        for threads in [1, 2, 5] {
+            let settings = BuildSettings { threads, ..BuildSettings::preset(Preset::Balanced) };
+            let (tree, binary) = build(&geometry, &settings, &()).expect("settings in range");
+            let (wide, report) = WideTree::build(&geometry, &settings, &()).unwrap();
+            assert_eq!(wide.validate(&tree), Ok(()));
+            assert_eq!(wide.has_shapes(), has_shapes);
+            assert_eq!((report.tree, report.stops), (binary.tree, binary.stops));
+            let compiled = WideTree::compile(&tree, &geometry).unwrap();
+            assert_eq!(wide.treelets(), compiled.treelets());
+            let bits = |b: &Block| (b.vertex.map(|v| v.map(|row| row.map(f32::to_bits))), b.id);
+            assert!(wide.blocks().iter().map(bits).eq(compiled.blocks().iter().map(bits)));
+        }
+    }
+    let cancel = Watch { cancel_at: 1, ..Watch::default() };
+    let settings = BuildSettings::preset(Preset::Balanced);
+    let cancelled = WideTree::build(&geometry, &settings, &cancel).map(|_| ());
+    assert_eq!(cancelled, Err(BuildError::Cancelled));
 }
 
 #[test]
@@ -421,8 +448,9 @@ impl Monitor for Watch {
 #[test]
 fn monitors_see_progress_and_can_cancel() {
     let geometry = soup(10_000);
-    for threads in [1, 2] {
-        let settings = BuildSettings { threads, ..BuildSettings::default() };
+    let presets = Preset::ALL.map(BuildSettings::preset);
+    let all = presets.into_iter().chain([BuildSettings::default()]);
+    for settings in all.flat_map(|s| [1, 2].map(|threads| BuildSettings { threads, ..s.clone() })) {
         let watch = Watch::default();
         build(&geometry, &settings, &watch).expect("not cancelled");
         let progress = watch.progress.into_inner().expect("no panic while locked");

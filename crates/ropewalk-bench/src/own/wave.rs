@@ -5,7 +5,7 @@ use crate::answer::{BenchHit, HitLists};
 use crate::harness::{Builder, Built, Clock, Engine, Family};
 use crate::scene::Mesh;
 use crate::workload::Question;
-use ropewalk::build::{BuildSettings, Preset, build};
+use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::kernel::BatchCaster;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray};
@@ -31,8 +31,7 @@ impl Wave {
     }
 
     fn over(geometry: Geometry, threads: usize) -> anyhow::Result<Self> {
-        let (tree, _) = build(&geometry, &settings(threads), &())?;
-        let tree = WideTree::compile(&tree, &geometry)?;
+        let (tree, _) = WideTree::build(&geometry, &settings(threads), &())?;
         Ok(Wave { geometry, tree })
     }
 

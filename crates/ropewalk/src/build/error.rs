@@ -27,6 +27,9 @@ pub enum BuildError {
         /// The limit.
         max: u32,
     },
+    /// The binary tree cannot be compiled to a wide tree.
+    #[error(transparent)]
+    Compile(#[from] crate::wide::CompileError),
     /// The thread pool could not be started.
     #[error("cannot start {threads} build threads: {reason}")]
     Threads {

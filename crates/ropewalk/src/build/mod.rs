@@ -61,27 +61,34 @@ pub fn build(
     settings: &BuildSettings,
     monitor: &dyn Monitor,
 ) -> Result<(BspTree, BuildReport), BuildError> {
-    let start = Instant::now();
     let settings = settings.effective()?;
-    in_pool(settings.threads, || {
-        let blockage = blockage(geometry, &settings, monitor)?;
-        let output = build_output(geometry, &settings, blockage.as_ref(), monitor)?;
-        let tree = BspTree::from_parts(geometry.bounds(), output.nodes, output.refs);
-        let seconds = start.elapsed().as_secs_f64();
-        let stats = TreeStats::of(&tree);
-        let report = BuildReport {
-            primitives: geometry.len(),
-            degenerate: geometry.degenerate_count(),
-            duplication: stats.references as f64 / geometry.len().max(1) as f64,
-            tree: stats,
-            stops: output.stops,
-            beta: blockage.as_ref().and_then(Blockage::beta),
-            estimator: blockage.map(|b| estimator_stats(geometry, &tree, &b)),
-            seconds,
-            settings,
-        };
-        Ok((tree, report))
-    })?
+    in_pool(settings.threads, || build_here(geometry, &settings, monitor))?
+}
+
+/// Builds with effective settings on the threads of the caller's pool.
+pub(crate) fn build_here(
+    geometry: &Geometry,
+    settings: &BuildSettings,
+    monitor: &dyn Monitor,
+) -> Result<(BspTree, BuildReport), BuildError> {
+    let start = Instant::now();
+    let blockage = blockage(geometry, settings, monitor)?;
+    let output = build_output(geometry, settings, blockage.as_ref(), monitor)?;
+    let tree = BspTree::from_parts(geometry.bounds(), output.nodes, output.refs);
+    let seconds = start.elapsed().as_secs_f64();
+    let stats = TreeStats::of(&tree);
+    let report = BuildReport {
+        primitives: geometry.len(),
+        degenerate: geometry.degenerate_count(),
+        duplication: stats.references as f64 / geometry.len().max(1) as f64,
+        tree: stats,
+        stops: output.stops,
+        beta: blockage.as_ref().and_then(Blockage::beta),
+        estimator: blockage.map(|b| estimator_stats(geometry, &tree, &b)),
+        seconds,
+        settings: settings.clone(),
+    };
+    Ok((tree, report))
 }
 
 /// The estimator of a measure that uses one, calibrated.
@@ -128,7 +135,10 @@ fn probe_tree(
 }
 
 /// Runs `work` in a pool of its own, in the global pool (0) or without one (1).
-fn in_pool<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> Result<T, BuildError> {
+pub(crate) fn in_pool<T: Send>(
+    threads: usize,
+    work: impl FnOnce() -> T + Send,
+) -> Result<T, BuildError> {
     if threads <= 1 {
         return Ok(work());
     }

@@ -200,6 +200,7 @@ impl BuildSettings {
             late_cutting: false,
             clipping,
             binned_from,
+            max_duplication: 16.0,
             ..BuildSettings::default()
         }
     }

@@ -5,11 +5,36 @@ use super::{
     Block, COUNT_OVERFLOW, CompileError, LEVELS, MAX_LINES, SIDES_BACK, SIDES_BOTH, SIDES_FRONT,
     Treelet, WIDTH, WideTree, leaf_code, treelet_code,
 };
+use crate::build::{self, BuildError, BuildReport, BuildSettings, Monitor};
 use crate::geometry::Geometry;
 use crate::primitive::{Primitive, Shape, Sides};
 use crate::tree::{BspTree, NodeKind};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 impl WideTree {
+    /// Builds a binary tree over `geometry` and compiles it, both with `settings.threads` threads;
+    /// the same tree for any number. [`BuildSettings::preset`] has settings made for it. Of the
+    /// binary tree only the report is left; its time includes the compilation.
+    ///
+    /// # Errors
+    /// See [`build`](build::build); [`BuildError::Compile`] where the tree cannot be compiled.
+    pub fn build(
+        geometry: &Geometry,
+        settings: &BuildSettings,
+        monitor: &dyn Monitor,
+    ) -> Result<(WideTree, BuildReport), BuildError> {
+        let start = Instant::now();
+        let settings = settings.effective()?;
+        build::in_pool(settings.threads, || {
+            let (tree, mut report) = build::build_here(geometry, &settings, monitor)?;
+            let wide = Self::compile_with(&tree, geometry, settings.threads != 1)?;
+            report.seconds = start.elapsed().as_secs_f64();
+            Ok((wide, report))
+        })?
+    }
+
     /// Compiles `tree`, which was built over `geometry`.
     ///
     /// Laid out depth first: behind a treelet come the blocks of its leaves, then the subtrees of
@@ -18,6 +43,14 @@ impl WideTree {
     /// # Errors
     /// [`CompileError`] if the tree is too large for its codes or for memory.
     pub fn compile(tree: &BspTree, geometry: &Geometry) -> Result<WideTree, CompileError> {
+        Self::compile_with(tree, geometry, false)
+    }
+
+    fn compile_with(
+        tree: &BspTree,
+        geometry: &Geometry,
+        parallel: bool,
+    ) -> Result<WideTree, CompileError> {
         let (treelets, blocks) = count(tree);
         // Line 0 is a dummy, so that the code 0 means an empty cell everywhere.
         let needed = 1 + treelets + blocks * BLOCK_LINES;
@@ -28,22 +61,21 @@ impl WideTree {
             bytes: needed * LINE,
             reason: error.to_string(),
         })?;
-        let mut compiler =
-            Compiler { tree, geometry, lines, next: 1, overflow: Vec::new(), has_shapes: false };
+        let mut compiler = Compiler {
+            tree,
+            lines,
+            next: 1,
+            runs: Vec::with_capacity(blocks),
+            overflow: Vec::new(),
+        };
         let root = match tree.kind(BspTree::ROOT) {
             NodeKind::Leaf { first, count } => compiler.leaf(first, count),
             NodeKind::Inner { .. } => compiler.subtree(BspTree::ROOT),
         };
-        debug_assert_eq!(compiler.next as usize, needed);
-        Ok(WideTree {
-            bounds: tree.bounds(),
-            root,
-            lines: compiler.lines,
-            treelets,
-            blocks,
-            overflow: compiler.overflow,
-            has_shapes: compiler.has_shapes,
-        })
+        let Compiler { mut lines, next, runs, overflow, .. } = compiler;
+        debug_assert_eq!(next as usize, needed);
+        let has_shapes = fill(&mut lines, &runs, tree, geometry, parallel);
+        Ok(WideTree { bounds: tree.bounds(), root, lines, treelets, blocks, overflow, has_shapes })
     }
 }
 
@@ -66,12 +98,83 @@ fn count(tree: &BspTree) -> (usize, usize) {
 
 struct Compiler<'a> {
     tree: &'a BspTree,
-    geometry: &'a Geometry,
     lines: Lines,
     /// The first line not taken.
     next: u32,
+    /// What goes into each block; they are filled last, since that is most of the work.
+    runs: Vec<Run>,
     overflow: Vec<(u32, u32)>,
-    has_shapes: bool,
+}
+
+/// The references that go into a block.
+#[derive(Clone, Copy)]
+struct Run {
+    /// Line of the block.
+    line: u32,
+    first_ref: u32,
+    count: u32,
+}
+
+/// Blocks that are worth a task of their own.
+const MIN_RUNS: usize = 1024;
+
+/// Fills all blocks; true if any holds something else than triangles.
+fn fill(
+    lines: &mut Lines,
+    runs: &[Run],
+    tree: &BspTree,
+    geometry: &Geometry,
+    parallel: bool,
+) -> bool {
+    let has_shapes = AtomicBool::new(false);
+    let write = |(runs, first, bytes): (&[Run], u32, &mut [u8])| {
+        for run in runs {
+            let block = block(geometry, tree.leaf_refs(run.first_ref, run.count), &has_shapes);
+            let at = (run.line - first) as usize * LINE;
+            bytes[at..][..size_of::<Block>()].copy_from_slice(bytemuck::bytes_of(&block));
+        }
+    };
+    // Blocks lie in the order of their runs, so that each task gets lines of its own.
+    let (mut rest, mut at) = (lines.bytes_mut(), 0);
+    let mut tasks = Vec::with_capacity(runs.len().div_ceil(MIN_RUNS));
+    for runs in runs.chunks(MIN_RUNS) {
+        let end = runs[runs.len() - 1].line + BLOCK_LINES as u32;
+        let (bytes, behind) = rest.split_at_mut((end - at) as usize * LINE);
+        tasks.push((runs, at, bytes));
+        (rest, at) = (behind, end);
+    }
+    if parallel {
+        tasks.into_par_iter().for_each(write);
+    } else {
+        tasks.into_iter().for_each(write);
+    }
+    has_shapes.into_inner()
+}
+
+/// A block of up to eight primitives; notes whether there are others than triangles.
+fn block(geometry: &Geometry, prims: &[u32], has_shapes: &AtomicBool) -> Block {
+    let mut block = Block::EMPTY;
+    for (lane, &prim) in prims.iter().enumerate().take(WIDTH) {
+        let sides = match geometry.sides(prim) {
+            Sides::Both => SIDES_BOTH,
+            Sides::Front => SIDES_FRONT,
+            Sides::Back => SIDES_BACK,
+        };
+        block.id[lane] = prim | sides;
+        match geometry.shape(prim) {
+            // A degenerate triangle keeps its id and NaN vertices: it is never hit.
+            Shape::Triangle(triangle) if triangle.is_degenerate() => {}
+            Shape::Triangle(triangle) => {
+                for (rows, vertex) in block.vertex.iter_mut().zip(triangle.vertices) {
+                    for (row, x) in rows.iter_mut().zip(vertex) {
+                        row[lane] = x;
+                    }
+                }
+            }
+            _ => has_shapes.store(true, Ordering::Relaxed),
+        }
+    }
+    block
 }
 
 impl Compiler<'_> {
@@ -126,40 +229,19 @@ impl Compiler<'_> {
         }
     }
 
-    /// Writes the blocks of a leaf, its primitives in ascending order; its code.
-    fn leaf(&mut self, first_ref: u32, count: u32) -> u32 {
-        if count == 0 {
+    /// Hands out the blocks of a leaf, its primitives in ascending order; its code.
+    fn leaf(&mut self, first_ref: u32, refs: u32) -> u32 {
+        if refs == 0 {
             return 0;
         }
-        let blocks = count.div_ceil(WIDTH as u32);
+        let width = WIDTH as u32;
+        let blocks = refs.div_ceil(width);
         let first = self.take(blocks as usize * BLOCK_LINES);
-        let mut line = first as usize;
-        let refs = self.tree.leaf_refs(first_ref, count);
-        for lanes in refs.chunks(WIDTH) {
-            let mut block = Block::EMPTY;
-            for (lane, &prim) in lanes.iter().enumerate() {
-                let sides = match self.geometry.sides(prim) {
-                    Sides::Both => SIDES_BOTH,
-                    Sides::Front => SIDES_FRONT,
-                    Sides::Back => SIDES_BACK,
-                };
-                block.id[lane] = prim | sides;
-                match self.geometry.shape(prim) {
-                    // A degenerate triangle keeps its id and NaN vertices: it is never hit.
-                    Shape::Triangle(triangle) if triangle.is_degenerate() => {}
-                    Shape::Triangle(triangle) => {
-                        for (rows, vertex) in block.vertex.iter_mut().zip(triangle.vertices) {
-                            for (row, x) in rows.iter_mut().zip(vertex) {
-                                row[lane] = x;
-                            }
-                        }
-                    }
-                    _ => self.has_shapes = true,
-                }
-            }
-            self.lines.set_block(line, &block);
-            line += BLOCK_LINES;
-        }
+        self.runs.extend((0..blocks).map(|i| Run {
+            line: first + i * BLOCK_LINES as u32,
+            first_ref: first_ref + i * width,
+            count: width.min(refs - i * width),
+        }));
         if blocks >= COUNT_OVERFLOW {
             self.overflow.push((first, blocks));
         }

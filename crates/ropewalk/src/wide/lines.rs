@@ -76,9 +76,9 @@ impl Lines {
             .copy_from_slice(bytemuck::bytes_of(treelet));
     }
 
-    /// Writes a block.
-    pub fn set_block(&mut self, line: usize, block: &Block) {
-        self.map[line * LINE..][..size_of::<Block>()].copy_from_slice(bytemuck::bytes_of(block));
+    /// All bytes.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut self.map
     }
 }
 
