@@ -339,9 +339,10 @@ fn split_piece(
     for i in 0..count {
         let f = own[i];
         let (lo, hi) = (f.min(axis), f.max(axis));
-        let planar = (lo == hi) & (lo == position);
-        let goes_left = (lo < position) | (planar & plane.planar_left);
-        let goes_right = (hi > position) | (planar & !plane.planar_left);
+        // What reaches neither below nor above lies in the plane.
+        let (below, above) = (lo < position, hi > position);
+        let goes_left = below | (!above & plane.planar_left);
+        let goes_right = above | (!below & !plane.planar_left);
         lefts[l] = f; // l <= i < count
         own[r] = f; // r <= i: read already
         straddlers[both] = (l as u32, r as u32);

@@ -3,6 +3,7 @@
 use super::event::{Event, EventKind};
 use crate::aabb::Aabb;
 use crate::geometry::Geometry;
+use glam::Vec4;
 
 /// The box of one primitive's part inside the cell of a node, in 32 bytes.
 ///
@@ -43,6 +44,18 @@ impl Fragment {
     #[inline(always)]
     pub fn prim(&self) -> u32 {
         self.lanes[3].to_bits()
+    }
+
+    /// The lower corner, and a number that stands for the primitive.
+    #[inline(always)]
+    pub fn lower(&self) -> Vec4 {
+        Vec4::from_slice(&self.lanes[..4])
+    }
+
+    /// The upper corner, and 0.
+    #[inline(always)]
+    pub fn upper(&self) -> Vec4 {
+        Vec4::from_slice(&self.lanes[4..])
     }
 
     #[inline(always)]

@@ -6,6 +6,7 @@ use super::{NodeView, PlaneSearch, SearchBuffers, Sweep, priced_plane};
 use crate::build::fragment::Fragment;
 use crate::build::plane::{CellAreas, Counts, Plane, Pricing};
 use crate::cost::MacDonaldBooth;
+use glam::Vec4;
 use rayon::prelude::*;
 
 /// Extents within which positions can be spread in `f32`.
@@ -195,12 +196,15 @@ struct Tight {
 
 impl Tight {
     fn of(fragments: &[Fragment]) -> Self {
-        let (min, max, flat) = extremes(fragments);
-        Tight {
-            min: [min[0], min[1], min[2]],
-            max: [max[4], max[5], max[6]],
-            any_planar: flat[..3] != [0.0; 3],
+        let (mut min, mut max, mut flat) = (Vec4::INFINITY, Vec4::NEG_INFINITY, 0);
+        for f in fragments {
+            let (lower, upper) = (f.lower(), f.upper());
+            min = min.min(lower);
+            max = max.max(upper);
+            flat |= lower.cmpeq(upper).bitmask();
         }
+        let ([x0, y0, z0, _], [x1, y1, z1, _]) = (min.to_array(), max.to_array());
+        Tight { min: [x0, y0, z0], max: [x1, y1, z1], any_planar: flat & 0b111 != 0 }
     }
 
     fn add(&mut self, other: Tight) {
@@ -330,9 +334,9 @@ const BINS: usize = 32;
 
 /// Where the bins lie: bin `b` holds what rounds to `b`, so that the outermost ones are half as wide.
 struct Grid {
-    origin: [f32; 4],
+    origin: Vec4,
     /// Bins per unit; 0 on an axis without extent.
-    scale: [f32; 4],
+    scale: Vec4,
 }
 
 /// How many fragments start and end in each bin of each axis.
@@ -353,7 +357,7 @@ const ROUNDING: f32 = (1u32 << 23) as f32;
 
 impl Grid {
     fn over(tight: &Tight) -> Self {
-        let (mut origin, mut scale) = ([0.0; 4], [0.0; 4]);
+        let (mut origin, mut scale) = (Vec4::ZERO, Vec4::ZERO);
         for axis in 0..3 {
             let extent = tight.max[axis] - tight.min[axis];
             origin[axis] = tight.min[axis];
@@ -372,12 +376,15 @@ impl Bins {
     fn of(fragments: &[Fragment], grid: &Grid) -> Self {
         let mut bins = Bins { starts: [[0; BINS]; 3], ends: [[0; BINS]; 3] };
         for f in fragments {
-            let bin: [u32; 8] = std::array::from_fn(|i| {
-                ((f.lanes[i] - grid.origin[i & 3]) * grid.scale[i & 3] + ROUNDING).to_bits()
-            });
+            let bin = |corner: Vec4| {
+                ((corner - grid.origin) * grid.scale + Vec4::splat(ROUNDING))
+                    .to_array()
+                    .map(|x| x.to_bits() as usize & (BINS - 1))
+            };
+            let (start, end) = (bin(f.lower()), bin(f.upper()));
             for axis in 0..3 {
-                bins.starts[axis][bin[axis] as usize & (BINS - 1)] += 1;
-                bins.ends[axis][bin[4 + axis] as usize & (BINS - 1)] += 1;
+                bins.starts[axis][start[axis]] += 1;
+                bins.ends[axis][end[axis]] += 1;
             }
         }
         bins
@@ -444,24 +451,6 @@ fn search_interval(
         candidates.set(&beside(fragments.all, axis, (middle, middle), inside));
     }
     candidates.offer(fragments, axis, measure, best);
-}
-
-/// The extremes of all lanes, and for each axis something else than 0 if a fragment is flat there.
-/// Not inlined, or the compiler would take the lanes apart that nobody reads.
-#[inline(never)]
-fn extremes(fragments: &[Fragment]) -> ([f32; 8], [f32; 8], [f32; 4]) {
-    let (mut min, mut max) = ([f32::INFINITY; 8], [f32::NEG_INFINITY; 8]);
-    let mut flat = [0.0; 4];
-    for f in fragments {
-        for i in 0..8 {
-            min[i] = if f.lanes[i] < min[i] { f.lanes[i] } else { min[i] };
-            max[i] = if f.lanes[i] > max[i] { f.lanes[i] } else { max[i] };
-        }
-        for i in 0..4 {
-            flat[i] = if f.lanes[i] == f.lanes[4 + i] { 1.0 } else { flat[i] };
-        }
-    }
-    (min, max, flat)
 }
 
 /// Evenly spaced positions in a range; the last one is its end.
