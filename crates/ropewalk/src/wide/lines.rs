@@ -77,6 +77,11 @@ impl Lines {
     }
 
     /// All bytes.
+    pub fn bytes(&self) -> &[u8] {
+        &self.map
+    }
+
+    /// All bytes, to be written.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
         &mut self.map
     }
