@@ -73,10 +73,14 @@ fn time(
         .map(|_| {
             let clock = Clock::start();
             match question {
-                Question::Occluded => caster.occluded_into(rays, &mut hit),
+                Question::Occluded => {
+                    caster.occluded_into(rays, &mut hit);
+                }
                 Question::AllHits => drop(caster.all_hits(rays)),
                 Question::FirstHits(k) => drop(caster.first_hits(rays, k)),
-                _ => caster.closest_hit_into(rays, &mut t, &mut prim),
+                _ => {
+                    caster.closest_hit_into(rays, &mut t, &mut prim);
+                }
             }
             clock.elapsed().0 * 1e9 / rays.len() as f64
         })

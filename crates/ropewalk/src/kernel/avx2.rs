@@ -16,9 +16,10 @@ pub struct Avx2;
 
 /// For each mask the lanes that it keeps, in order.
 #[repr(C, align(64))]
-struct CompressTable([[u8; 8]; 256]);
+pub struct CompressTable(pub [[u8; 8]; 256]);
 
-static COMPRESS: CompressTable = {
+/// The table.
+pub static COMPRESS: CompressTable = {
     let mut table = [[0; 8]; 256];
     let mut mask = 0;
     while mask < 256 {

@@ -2,8 +2,10 @@
 
 #![allow(unsafe_code)]
 
+use super::beam::{self, BatchReport, BeamQuery, beams};
 use super::events::{BatchEvents, Events, NoEvents};
 use super::level::Level;
+use super::order::{GROUP, Sorter};
 use super::query::{Any, BatchQuery, Closest, Count, Every, Filtered, HitFilter, NoFilter};
 use super::slot::Slot;
 use super::wave::{WAVE, wave};
@@ -14,6 +16,12 @@ use rayon::prelude::*;
 
 /// Rays that one task of a parallel batch traces.
 const TASK: usize = 4096;
+
+/// Bytes of a tree from which on incoherent rays are sorted: several times the last level of cache.
+const LARGE: usize = 64 << 20;
+
+/// Fewer rays than these are not worth sorting.
+const FEWEST_SORTED: usize = 8192;
 
 /// The hits of a batch: one entry a ray.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,13 +51,21 @@ pub struct BatchCaster<'a, F = NoFilter> {
     geometry: &'a Geometry,
     level: Level,
     threads: usize,
+    beams: bool,
     filter: F,
 }
 
 impl<'a> BatchCaster<'a> {
     /// A caster at the best level of this machine, on all threads of the current rayon pool.
     pub fn new(tree: &'a WideTree, geometry: &'a Geometry) -> Self {
-        BatchCaster { tree, geometry, level: Level::best(), threads: 0, filter: NoFilter }
+        BatchCaster {
+            tree,
+            geometry,
+            level: Level::best(),
+            threads: 0,
+            beams: true,
+            filter: NoFilter,
+        }
     }
 }
 
@@ -58,8 +74,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// batch and the hit, or [`Masks`](super::Masks) or [`Opacity`](super::Opacity) from arrays. It
     /// runs inside the traversal; see [`HitFilter`] for what it may rely on.
     pub fn with_filter<G: HitFilter>(self, filter: G) -> BatchCaster<'a, G> {
-        let BatchCaster { tree, geometry, level, threads, .. } = self;
-        BatchCaster { tree, geometry, level, threads, filter }
+        let BatchCaster { tree, geometry, level, threads, beams, .. } = self;
+        BatchCaster { tree, geometry, level, threads, beams, filter }
     }
 
     /// The same with another level, or `None` if this machine lacks it.
@@ -70,6 +86,12 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// The same on the calling thread only (`1`) or on the current rayon pool (`0`).
     pub fn with_threads(self, threads: usize) -> Self {
         BatchCaster { threads, ..self }
+    }
+
+    /// The same with all rays in the wave (`false`), or with coherent ones in beams (`true`, the
+    /// default). The answers are the same.
+    pub fn with_beams(self, beams: bool) -> Self {
+        BatchCaster { beams, ..self }
     }
 
     /// The level in use.
@@ -88,15 +110,21 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     ///
     /// # Panics
     /// If the lengths differ.
-    pub fn closest_hit_into(&self, rays: &[Ray], t: &mut [f32], prim_id: &mut [u32]) {
+    pub fn closest_hit_into(
+        &self,
+        rays: &[Ray],
+        t: &mut [f32],
+        prim_id: &mut [u32],
+    ) -> BatchReport {
         assert!(t.len() == rays.len() && prim_id.len() == rays.len(), "one entry a ray");
         if self.is_serial(rays) {
-            return self.run(rays, 0, Closest::new(t, prim_id), |_| ());
+            return self.run_coherent(rays, 0, Closest::new(t, prim_id));
         }
-        let chunks = t.par_chunks_mut(TASK).zip(prim_id.par_chunks_mut(TASK));
-        rays.par_chunks(TASK).zip(chunks).enumerate().for_each(|(i, (rays, (t, prim)))| {
-            self.run(rays, i * TASK, Closest::new(t, prim), |_| ());
-        });
+        let task = self.task(rays);
+        let chunks = t.par_chunks_mut(task).zip(prim_id.par_chunks_mut(task));
+        let chunks = rays.par_chunks(task).zip(chunks).enumerate();
+        let run = |(i, (rays, (t, prim)))| self.run_coherent(rays, i * task, Closest::new(t, prim));
+        chunks.map(run).reduce(BatchReport::default, |a, b| a + b)
     }
 
     /// Whether each ray hits anything.
@@ -110,15 +138,15 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     ///
     /// # Panics
     /// If the lengths differ.
-    pub fn occluded_into(&self, rays: &[Ray], hit: &mut [bool]) {
+    pub fn occluded_into(&self, rays: &[Ray], hit: &mut [bool]) -> BatchReport {
         assert!(hit.len() == rays.len(), "one entry a ray");
         if self.is_serial(rays) {
-            return self.run(rays, 0, Any { hit }, |_| ());
+            return self.run_coherent(rays, 0, Any { hit });
         }
-        let chunks = rays.par_chunks(TASK).zip(hit.par_chunks_mut(TASK));
-        chunks.enumerate().for_each(|(i, (rays, hit))| {
-            self.run(rays, i * TASK, Any { hit }, |_| ());
-        });
+        let task = self.task(rays);
+        let chunks = rays.par_chunks(task).zip(hit.par_chunks_mut(task)).enumerate();
+        let run = |(i, (rays, hit))| self.run_coherent(rays, i * task, Any { hit });
+        chunks.map(run).reduce(BatchReport::default, |a, b| a + b)
     }
 
     /// The number of primitives that each ray hits.
@@ -128,9 +156,10 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
             self.run(rays, 0, Count::new(&mut counts, WAVE), |_| ());
             return counts;
         }
-        let chunks = rays.par_chunks(TASK).zip(counts.par_chunks_mut(TASK));
+        let task = self.task(rays);
+        let chunks = rays.par_chunks(task).zip(counts.par_chunks_mut(task));
         chunks.enumerate().for_each(|(i, (rays, counts))| {
-            self.run(rays, i * TASK, Count::new(counts, WAVE), |_| ());
+            self.run(rays, i * task, Count::new(counts, WAVE), |_| ());
         });
         counts
     }
@@ -145,13 +174,14 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         if k == 0 {
             return AllHits { offsets: vec![0; rays.len() + 1], ..AllHits::default() };
         }
+        let task = self.task(rays);
         let gather = |(i, rays): (usize, &[Ray])| {
-            self.run(rays, i * TASK, Every::new(k, rays.len(), WAVE), |every| every)
+            self.run(rays, i * task, Every::new(k, rays.len(), WAVE), |every| every)
         };
         let parts: Vec<Every> = if self.is_serial(rays) {
             vec![gather((0, rays))]
         } else {
-            rays.par_chunks(TASK).enumerate().map(gather).collect()
+            rays.par_chunks(task).enumerate().map(gather).collect()
         };
         let total = parts.iter().map(|p| p.done.len()).sum();
         let mut all = AllHits {
@@ -191,7 +221,50 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         self.threads == 1 || rays.len() <= TASK
     }
 
-    /// Puts `rays`, the first of which is `first_ray` in the batch, to `query`.
+    /// Rays of a task of a parallel batch: more where they are sorted, unless that would leave
+    /// threads without work.
+    fn task(&self, rays: &[Ray]) -> usize {
+        let share = rays.len() / (4 * rayon::current_num_threads());
+        if self.is_large() { share.clamp(TASK, GROUP) } else { TASK }
+    }
+
+    /// True if the tree is so much larger than the caches that sorting incoherent rays pays.
+    fn is_large(&self) -> bool {
+        self.tree.bytes() >= LARGE
+    }
+
+    /// Coherent rays in beams, the others in the wave.
+    fn run_coherent<Q: BeamQuery>(&self, rays: &[Ray], first_ray: usize, query: Q) -> BatchReport {
+        if F::FILTERS || !self.beams || self.tree.has_shapes() {
+            self.run(rays, first_ray, query, |_| ());
+            return BatchReport { wave_rays: rays.len() as u64, ..BatchReport::default() };
+        }
+        let mut query = query;
+        with_room(|room| {
+            room.order.clear();
+            let (order, room_for_beams) = (&mut room.order, &mut *room.beam);
+            let (tree, query) = (self.tree, &mut query);
+            let report = match self.level {
+                // SAFETY: portable code.
+                Level::Scalar => unsafe {
+                    beams::<super::scalar::Scalar, Q>(tree, rays, query, room_for_beams, order)
+                },
+                // SAFETY: `with_level` and `Level::best` give only levels this machine has.
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx2 => unsafe { beams_avx2(tree, rays, query, room_for_beams, order) },
+                // SAFETY: as above.
+                #[cfg(target_arch = "x86_64")]
+                Level::Avx512 => unsafe { beams_avx512(tree, rays, query, room_for_beams, order) },
+                #[cfg(not(target_arch = "x86_64"))]
+                _ => unreachable!("only available levels can be chosen"),
+            };
+            self.sort(rays, room);
+            self.wave::<Q, NoEvents, false>(rays, room, query, &mut NoEvents);
+            BatchReport { wave_rays: room.order.len() as u64, ..report }
+        })
+    }
+
+    /// Puts `rays`, the first of which is `first_ray` in the batch, to `query` in the wave.
     fn run<Q: BatchQuery, T>(
         &self,
         rays: &[Ray],
@@ -205,72 +278,119 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     }
 
     fn run_counted<Q: BatchQuery, E: Events>(&self, rays: &[Ray], query: &mut Q, events: &mut E) {
-        if self.tree.has_shapes() {
-            self.run_level::<Q, E, true>(rays, query, events);
-        } else {
-            self.run_level::<Q, E, false>(rays, query, events);
-        }
-    }
-
-    fn run_level<Q: BatchQuery, E: Events, const SHAPES: bool>(
-        &self,
-        rays: &[Ray],
-        query: &mut Q,
-        events: &mut E,
-    ) {
-        thread_local! {
-            static SLOTS: std::cell::RefCell<Vec<Slot>> = const { std::cell::RefCell::new(Vec::new()) };
-        }
-        let (tree, geometry) = (self.tree, self.geometry);
-        SLOTS.with_borrow_mut(|slots| {
-            if slots.is_empty() {
-                slots.resize_with(WAVE, Slot::new);
-            }
-            let slots = &mut slots[..rays.len().min(WAVE)];
-            match self.level {
-                // SAFETY: portable code.
-                Level::Scalar => unsafe {
-                    wave::<super::scalar::Scalar, Q, E, SHAPES>(
-                        tree, geometry, rays, slots, query, events,
-                    );
-                },
-                // SAFETY: `with_level` and `Level::best` give only levels this machine has.
-                #[cfg(target_arch = "x86_64")]
-                Level::Avx2 => unsafe {
-                    wave_avx2::<Q, E, SHAPES>(tree, geometry, rays, slots, query, events);
-                },
-                // SAFETY: as above.
-                #[cfg(target_arch = "x86_64")]
-                Level::Avx512 => unsafe {
-                    wave_avx512::<Q, E, SHAPES>(tree, geometry, rays, slots, query, events);
-                },
-                #[cfg(not(target_arch = "x86_64"))]
-                _ => unreachable!("only available levels can be chosen"),
+        with_room(|room| {
+            room.order.clear();
+            room.order.extend(0..rays.len() as u32);
+            self.sort(rays, room);
+            if self.tree.has_shapes() {
+                self.wave::<Q, E, true>(rays, room, query, events);
+            } else {
+                self.wave::<Q, E, false>(rays, room, query, events);
             }
         });
     }
+
+    /// Sorts the rays of `room.order` in groups where that pays.
+    fn sort(&self, rays: &[Ray], room: &mut Room) {
+        if self.is_large() && room.order.len() >= FEWEST_SORTED {
+            for group in room.order.chunks_mut(GROUP) {
+                room.sorter.sort(group, rays, self.tree.bounds());
+            }
+        }
+    }
+
+    /// The rays of `room.order` in the wave.
+    fn wave<Q: BatchQuery, E: Events, const SHAPES: bool>(
+        &self,
+        rays: &[Ray],
+        room: &mut Room,
+        query: &mut Q,
+        events: &mut E,
+    ) {
+        let (tree, geometry, order) = (self.tree, self.geometry, &room.order[..]);
+        let slots = &mut room.slots[..];
+        match self.level {
+            // SAFETY: portable code.
+            Level::Scalar => unsafe {
+                wave::<super::scalar::Scalar, Q, E, SHAPES>(
+                    tree, geometry, rays, order, slots, query, events,
+                );
+            },
+            // SAFETY: `with_level` and `Level::best` give only levels this machine has.
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => unsafe {
+                wave_avx2::<Q, E, SHAPES>(tree, geometry, rays, order, slots, query, events);
+            },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => unsafe {
+                wave_avx512::<Q, E, SHAPES>(tree, geometry, rays, order, slots, query, events);
+            },
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => unreachable!("only available levels can be chosen"),
+        }
+    }
+}
+
+/// What a thread keeps between batches.
+struct Room {
+    slots: Vec<Slot>,
+    beam: Box<beam::Room>,
+    order: Vec<u32>,
+    sorter: Sorter,
+}
+
+fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
+    thread_local! {
+        static ROOM: std::cell::RefCell<Option<Room>> = const { std::cell::RefCell::new(None) };
+    }
+    ROOM.with_borrow_mut(|room| {
+        work(room.get_or_insert_with(|| Room {
+            slots: (0..WAVE).map(|_| Slot::new()).collect(),
+            beam: Box::new(beam::Room::new()),
+            order: Vec::new(),
+            sorter: Sorter::default(),
+        }))
+    })
 }
 
 macro_rules! instantiate {
-    ($name:ident, $level:ty, $features:literal) => {
+    ($wave:ident, $beams:ident, $level:ty, $features:literal) => {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
-        fn $name<Q: BatchQuery, E: Events, const SHAPES: bool>(
+        fn $wave<Q: BatchQuery, E: Events, const SHAPES: bool>(
             tree: &WideTree,
             geometry: &Geometry,
             rays: &[Ray],
+            order: &[u32],
             slots: &mut [Slot],
             query: &mut Q,
             events: &mut E,
         ) {
             // SAFETY: this function enables the level's features.
-            unsafe { wave::<$level, Q, E, SHAPES>(tree, geometry, rays, slots, query, events) }
+            unsafe {
+                wave::<$level, Q, E, SHAPES>(tree, geometry, rays, order, slots, query, events)
+            }
+        }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = $features)]
+        fn $beams<Q: BeamQuery>(
+            tree: &WideTree,
+            rays: &[Ray],
+            query: &mut Q,
+            room: &mut beam::Room,
+            left: &mut Vec<u32>,
+        ) -> BatchReport {
+            // SAFETY: this function enables the level's features.
+            unsafe { beams::<$level, Q>(tree, rays, query, room, left) }
         }
     };
 }
-instantiate!(wave_avx2, super::avx2::Avx2, "avx2,fma,bmi1,bmi2,popcnt,lzcnt");
+instantiate!(wave_avx2, beams_avx2, super::avx2::Avx2, "avx2,fma,bmi1,bmi2,popcnt,lzcnt");
 instantiate!(
     wave_avx512,
+    beams_avx512,
     super::avx512::Avx512,
     "avx2,fma,bmi1,bmi2,popcnt,lzcnt,avx512f,avx512vl,avx512bw,avx512dq"
 );

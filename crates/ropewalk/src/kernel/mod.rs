@@ -2,15 +2,21 @@
 //!
 //! A batch keeps many rays in flight on each core: while one ray waits for a cache line, others
 //! step. The loop is written once (wave.rs) and is generic over the SIMD [`Level`] and the query.
+//!
+//! Rays in turn that start or end in one point, or are parallel, and lie close together are taken out of
+//! the batch first and answered in beams (beam/), at a fraction of the cost; which way the rays went is
+//! reported, and answers do not depend on it.
 
 mod avx2;
 mod avx512;
 mod batch;
+mod beam;
 mod events;
 mod exact;
 mod extreme;
 mod level;
 mod list;
+mod order;
 mod query;
 mod scalar;
 mod slot;
@@ -18,6 +24,7 @@ mod wave;
 mod x86;
 
 pub use batch::{AllHits, BatchCaster, BatchHit};
+pub use beam::BatchReport;
 pub use events::BatchEvents;
 pub use level::Level;
 pub use query::{HitFilter, Masks, NoFilter, Opacity};

@@ -59,6 +59,7 @@ struct Wave<'a, Q, E> {
     tree: &'a WideTree,
     geometry: &'a Geometry,
     exact: Exact<'a>,
+    order: &'a [u32],
     root: Root,
     slots: &'a mut [Slot],
     query: &'a mut Q,
@@ -69,7 +70,7 @@ struct Wave<'a, Q, E> {
     moved: List,
 }
 
-/// Runs a batch through `slots.len()` slots, [`WAVE`] at most.
+/// Runs the rays that `order` lists through `slots.len()` slots, [`WAVE`] at most.
 ///
 /// # Safety
 /// The machine must have the features of `L`, and the caller must enable them: everything here is
@@ -79,15 +80,16 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
     tree: &WideTree,
     geometry: &Geometry,
     rays: &[Ray],
+    order: &[u32],
     slots: &mut [Slot],
     query: &mut Q,
     events: &mut E,
 ) {
     if tree.root() == 0 {
-        (0..rays.len()).for_each(|index| query.miss(index));
+        order.iter().for_each(|&index| query.miss(index as usize));
         return;
     }
-    let width = slots.len().min(WAVE);
+    let width = slots.len().min(order.len()).min(WAVE);
     let slots = &mut slots[..width];
     let exact = Exact { lines: tree.lines(), rays };
     let root = Root::new(tree.bounds(), tree.root());
@@ -97,6 +99,7 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
         tree,
         geometry,
         exact,
+        order,
         root,
         slots,
         query,
@@ -108,7 +111,7 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
     loop {
         // SAFETY: passed on to the caller.
         unsafe { wave.refill::<L>() };
-        while wave.lists.free.len == 0 || wave.next == rays.len() {
+        while wave.lists.free.len == 0 || wave.next == order.len() {
             if wave.lists.stepping.len + wave.lists.waiting.len == 0 {
                 wave.query.end(&exact);
                 return;
@@ -340,8 +343,9 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
     #[inline(always)]
     unsafe fn refill<L: Simd>(&mut self) {
         let mut n = 0;
-        while self.lists.free.len > 0 && self.next < self.exact.rays.len() {
-            let (index, k) = (self.next, self.lists.free.get(self.lists.free.len - 1).0);
+        while self.lists.free.len > 0 && self.next < self.order.len() {
+            let index = self.order[self.next] as usize;
+            let (k, _) = self.lists.free.get(self.lists.free.len - 1);
             self.next += 1;
             let (ray, slot) = (&self.exact.rays[index], &mut self.slots[k as usize]);
             // SAFETY: passed on to the caller.

@@ -123,7 +123,7 @@ pub struct Meeting {
 /// Where the sum of the edge functions is below this share of their products, these are computed
 /// again without rounding: the rounding of the products, 2^-53 each, so moves the hit by less than
 /// 2^-42 of the triangle's depth.
-const EDGE_FILTER: f64 = 1.0 / (1u64 << 11) as f64;
+pub(crate) const EDGE_FILTER: f64 = 1.0 / (1u64 << 11) as f64;
 
 /// The edge function of two sheared vertices: twice the signed area they span with the ray.
 #[inline]

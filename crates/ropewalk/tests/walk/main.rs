@@ -1,5 +1,6 @@
 //! The walks: each answers exactly as brute force does, over any valid tree.
 
+mod beam;
 mod bench;
 mod builders;
 mod exact;

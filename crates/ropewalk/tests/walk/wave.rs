@@ -22,7 +22,7 @@ fn every_hit(geometry: &Geometry, ray: &Ray) -> Vec<(f32, u32)> {
     hits
 }
 
-fn check(geometry: &Geometry, tree: &BspTree, rays: &[Ray]) {
+pub fn check(geometry: &Geometry, tree: &BspTree, rays: &[Ray]) {
     let wide = WideTree::compile(tree, geometry).unwrap();
     assert_eq!(wide.validate(tree), Ok(()));
     let oracle = BruteForce { geometry };

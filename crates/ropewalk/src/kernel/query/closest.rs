@@ -11,8 +11,8 @@ use crate::wide::ID_MASK;
 
 /// The first hit; ties to the lowest primitive.
 pub struct Closest<'a> {
-    t: &'a mut [f32],
-    prim: &'a mut [u32],
+    pub(in crate::kernel) t: &'a mut [f32],
+    pub(in crate::kernel) prim: &'a mut [u32],
     /// Finished rays whose hit is known but not its exact parameter, and where it lies.
     pending: [(u32, At); PENDING],
     count: usize,

@@ -1,0 +1,260 @@
+//! Eight triangles as a beam sees them: edge functions linear in the rays' two coordinates.
+
+#![allow(unsafe_code)]
+
+use super::frame::{CORNER_SLACK, DEPTH_SLACK, Frame, PRODUCT_SLACK, Packet};
+use super::vector::Vector;
+use crate::kernel::exact::At;
+use crate::kernel::query::BatchQuery;
+use crate::wide::{Block, ID_MASK, SIDES_BACK, SIDES_FRONT, WIDTH};
+
+/// A row: one number a triangle.
+type Row = [f32; WIDTH];
+
+/// The triangles of a block in a frame.
+///
+/// With the vertices sheared along the frame's slope, `x` and `y` across and `z` along it, and `h = z`
+/// for rays through a common point, `h = 1` for parallel ones, the edge function of `p` and `q` for the
+/// ray at `(a, b)` is that of `(x - a h, y - b h)`:
+///
+/// ```text
+/// (p_x q_y - p_y q_x) + a (p_y h_q - h_p q_y) + b (h_p q_x - p_x h_q)
+/// ```
+/// Rows are stored with the sign that makes the sum of the three positive in the middle of the beam.
+#[repr(C, align(64))]
+pub struct Facets {
+    /// Constant, and factors of `a` and `b`, of the three edge functions.
+    edge: [[Row; 3]; 3],
+    /// Depths of the vertices.
+    depth: [Row; 3],
+    /// Nearest and farthest depth, widened by their error.
+    range: [Row; 2],
+    /// Error of an edge function.
+    slack: Row,
+    /// Error of an interpolated depth times the sum of the edge functions.
+    blur: Row,
+    /// Rounding error of a depth.
+    rounding: Row,
+    /// Triangles that cannot be hit from the side that the middle of the beam sees, one bit each.
+    culled: u32,
+}
+
+/// Which triangles may be hit by a packet, one bit each.
+pub struct Facing {
+    /// Those that all rays see from one side.
+    pub clear: u32,
+    /// Those that may be seen edge-on.
+    pub edge_on: u32,
+}
+
+impl Facets {
+    /// Facets without triangles.
+    pub const EMPTY: Facets = Facets {
+        edge: [[[0.0; WIDTH]; 3]; 3],
+        depth: [[0.0; WIDTH]; 3],
+        range: [[0.0; WIDTH]; 2],
+        slack: [0.0; WIDTH],
+        blur: [0.0; WIDTH],
+        rounding: [0.0; WIDTH],
+        culled: 0,
+    };
+
+    /// The triangles of `block` for rays within `radius` of the frame's slope or point.
+    ///
+    /// # Safety
+    /// As for [`Vector::splat`].
+    #[inline(always)]
+    pub unsafe fn project<V: Vector>(&mut self, frame: &Frame, radius: [f32; 2], block: &Block) {
+        // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
+        unsafe {
+            let [kx, ky, kz] = frame.axis;
+            let [px, py, pz] = frame.axis.map(|k| V::splat(frame.point[k]));
+            let (sx, sy) = (V::splat(frame.slope[0]), V::splat(frame.slope[1]));
+            let sign = V::splat(frame.sign);
+            let one = V::splat(1.0);
+            let corner = |i: usize| {
+                let row = |k: usize| V::load(&block.vertex[i][k]);
+                let z = (row(kz) - pz) * sign;
+                let x = sx.neg_mul_add(z, row(kx) - px);
+                let y = sy.neg_mul_add(z, row(ky) - py);
+                let h = if frame.concentric { z } else { one };
+                [x, y, z, h]
+            };
+            let [a, b, c] = [corner(0), corner(1), corner(2)];
+            let edge = |p: [V; 4], q: [V; 4]| {
+                [p[0] * q[1] - p[1] * q[0], p[1] * q[3] - p[3] * q[1], p[3] * q[0] - p[0] * q[3]]
+            };
+            // The edges in the order of the triangle test, so that signs agree.
+            let edges = [edge(c, b), edge(a, c), edge(b, a)];
+            let sum = edges[0][0] + edges[1][0] + edges[2][0];
+            for (rows, edge) in self.edge.iter_mut().zip(edges) {
+                for (row, x) in rows.iter_mut().zip(edge) {
+                    x.flip(sum).store(row);
+                }
+            }
+            for (row, p) in self.depth.iter_mut().zip([a, b, c]) {
+                p[2].store(row);
+            }
+            let (near, far) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
+            let away = near.abs().max(far.abs());
+            let rounding = V::splat(DEPTH_SLACK) * away;
+            rounding.store(&mut self.rounding);
+            (near - rounding).store(&mut self.range[0]);
+            (far + rounding).store(&mut self.range[1]);
+            // Extent of the vertices, and of vertices and rays.
+            let [[wide_x, size_x], [wide_y, size_y]] = std::array::from_fn(|i| {
+                let low = a[i].min(b[i]).min(c[i]);
+                let high = a[i].max(b[i]).max(c[i]);
+                let h = if frame.concentric { away } else { one };
+                [V::splat(radius[i]).mul_add(h, low.abs().max(high.abs())), high - low]
+            });
+            let across = V::splat(CORNER_SLACK).mul_add(away, V::splat(2.0 * frame.stray));
+            let rounded = V::splat(PRODUCT_SLACK) * wide_x * wide_y;
+            across.mul_add(wide_x + wide_y, rounded).store(&mut self.slack);
+            let blur = across.mul_add(size_x + size_y, rounded) * (far - near);
+            (blur + blur).store(&mut self.blur);
+            self.culled = culled(block, V::splat(0.0).lt(sum));
+        }
+    }
+
+    /// The triangles that some ray of the packet may hit.
+    ///
+    /// # Safety
+    /// As for [`Vector::splat`].
+    #[inline(always)]
+    pub unsafe fn facing<V: Vector>(&self, packet: &Packet) -> Facing {
+        // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
+        unsafe {
+            let [a, b] = packet.middle.map(|x| V::splat(x));
+            let [ra, rb] = packet.radius.map(|x| V::splat(x));
+            let slack = V::load(&self.slack);
+            let [u, v, w] = self.edge.each_ref().map(|[constant, by_a, by_b]| {
+                let (by_a, by_b) = (V::load(by_a), V::load(by_b));
+                let middle = b.mul_add(by_b, a.mul_add(by_a, V::load(constant)));
+                let reach = rb.mul_add(by_b.abs(), ra.mul_add(by_a.abs(), slack));
+                [middle, reach, by_a, by_b]
+            });
+            let zero = V::splat(0.0);
+            let high = (u[0] + u[1]).min(v[0] + v[1]).min(w[0] + w[1]);
+            let low = (u[0] - u[1]).max(v[0] - v[1]).max(w[0] - w[1]);
+            let sum = u[0] + v[0] + w[0];
+            let reach = ra.mul_add((u[2] + v[2] + w[2]).abs(), slack + slack);
+            let reach = rb.mul_add((u[3] + v[3] + w[3]).abs(), reach);
+            let clear = reach.lt(sum);
+            let ahead = V::load(&self.range[0]).le(V::splat(packet.farthest))
+                & V::splat(packet.nearest).le(V::load(&self.range[1]));
+            let front = zero.le(high);
+            Facing {
+                clear: clear & ahead & front & !self.culled,
+                edge_on: !clear & ahead & (front | low.le(zero)),
+            }
+        }
+    }
+}
+
+/// The lanes of a packet that a triangle concerns.
+pub struct Verdict {
+    /// Lanes that it hits for certain, in front of what they hit before.
+    pub hit: u32,
+    /// Lanes for which `f32` cannot tell.
+    pub open: u32,
+}
+
+impl Facets {
+    /// Tests triangle `i`, seen from one side, with all active rays of a packet; takes certain hits.
+    ///
+    /// # Safety
+    /// As for [`Vector::splat`].
+    #[inline(always)]
+    pub unsafe fn test<V: Vector, Q: BatchQuery>(
+        &self,
+        i: usize,
+        at: At,
+        prim: u32,
+        packet: &mut Packet,
+    ) -> Verdict {
+        // SAFETY: passed on to the caller; rows have `RAYS` numbers.
+        unsafe {
+            let (a, b) = (V::load(&packet.at[0]), V::load(&packet.at[1]));
+            let edge = |e: usize| {
+                let [constant, by_a, by_b] = &self.edge[e];
+                let u = a.mul_add(V::splat(by_a[i]), V::splat(constant[i]));
+                b.mul_add(V::splat(by_b[i]), u)
+            };
+            let (u, v, w) = (edge(0), edge(1), edge(2));
+            let low = u.min(v).min(w);
+            let slack = self.slack[i];
+            let touched = V::splat(-slack).le(low) & packet.active;
+            if touched == 0 {
+                return Verdict { hit: 0, open: 0 };
+            }
+            let inside = V::splat(2.0 * slack).le(low) & touched;
+            let [za, zb, zc] = [0, 1, 2].map(|c| self.depth[c][i]);
+            let r = V::splat(1.0).div(u + v + w);
+            let z = w.mul_add(V::splat(zc - za), v * V::splat(zb - za));
+            let z = z.mul_add(r, V::splat(za));
+            // The sum of the edge functions is six times their error at least: see `blur`.
+            let weight = V::splat(6.0 * slack).mul_add(r, V::splat(1.0)) * r;
+            let rounding = V::splat(self.rounding[i] + packet.rounding);
+            let blur = weight.mul_add(V::splat(self.blur[i]), rounding);
+            let (near, far) = (z - blur, z + blur);
+            let [best_low, best_high] = packet.best.each_ref().map(|row| V::load(row));
+            let [min_low, min_high] = packet.z_min.each_ref().map(|row| V::load(row));
+            let hit = inside & far.lt(best_low) & min_high.lt(near);
+            // Not certainly behind the best hit or before the range.
+            let matters = inside & near.le(best_high) & min_low.le(far) & !hit;
+            let unclear = touched & !inside & V::splat(self.range[0][i]).le(best_high);
+            if hit == 0 {
+            } else if Q::ANY {
+                packet.active &= !hit;
+            } else {
+                near.select(hit, best_low).store(&mut packet.best[0]);
+                far.select(hit, best_high).store(&mut packet.best[1]);
+                let at = V::splat(f32::from_bits(at));
+                at.select(hit, V::load(&packet.found)).store(&mut packet.found);
+                let prim = V::splat(f32::from_bits(prim));
+                prim.select(hit, V::load(&packet.prim)).store(&mut packet.prim);
+            }
+            Verdict { hit, open: matters | unclear }
+        }
+    }
+
+    /// Tests triangle `i`, which may be seen edge-on: nothing is certain.
+    ///
+    /// # Safety
+    /// As for [`Vector::splat`].
+    #[inline(always)]
+    pub unsafe fn test_edge_on<V: Vector>(&self, i: usize, packet: &Packet) -> Verdict {
+        // SAFETY: passed on to the caller; rows have `RAYS` numbers.
+        unsafe {
+            let (a, b) = (V::load(&packet.at[0]), V::load(&packet.at[1]));
+            let edge = |e: usize| {
+                let [constant, by_a, by_b] = &self.edge[e];
+                let u = a.mul_add(V::splat(by_a[i]), V::splat(constant[i]));
+                b.mul_add(V::splat(by_b[i]), u)
+            };
+            let (u, v, w) = (edge(0), edge(1), edge(2));
+            let (low, high) = (u.min(v).min(w), u.max(v).max(w));
+            let slack = self.slack[i];
+            let outside = low.lt(V::splat(-slack)) & V::splat(slack).lt(high);
+            let ahead = V::splat(self.range[0][i]).le(V::load(&packet.best[1]));
+            Verdict { hit: 0, open: packet.active & ahead & !outside }
+        }
+    }
+}
+
+/// The triangles whose visible side is not one on which they can be hit; `front` has the bits of
+/// those that show their front.
+#[inline(always)]
+fn culled(block: &Block, front: u32) -> u32 {
+    let sided = block.id.iter().fold(0, |sides, id| sides | id) & !ID_MASK;
+    if sided == 0 {
+        return 0;
+    }
+    let hidden = |i: usize| match block.id[i] & !ID_MASK {
+        SIDES_FRONT => !front >> i & 1,
+        SIDES_BACK => front >> i & 1,
+        _ => 0,
+    };
+    (0..WIDTH).fold(0, |mask, i| mask | hidden(i) << i)
+}

@@ -1,0 +1,204 @@
+//! What the reference test says, for all lanes of a packet at once where it goes the straight way.
+
+#![allow(unsafe_code)]
+
+use super::frame::{NONE, Packet, RAYS};
+use super::shaft::BeamSimd;
+use super::vector::{Doubles, Vector};
+use crate::kernel::exact::{At, Exact};
+use crate::primitive::EDGE_FILTER;
+use crate::wide::{ID_MASK, Lines, SIDES_BACK, SIDES_FRONT, WIDTH};
+
+/// A triangle for each lane: vertices by axis of the frame.
+#[repr(C, align(64))]
+pub struct Corners([[[f32; RAYS]; 3]; 3]);
+
+/// What the reference test says about the triangle of each lane.
+pub struct Judgement {
+    /// Parameters of the hits.
+    pub t: [f32; RAYS],
+    /// Lanes that hit, in their range, not minding sides.
+    pub hit: u32,
+    /// Lanes that miss.
+    pub miss: u32,
+    /// Lanes that see the front.
+    pub front: u32,
+}
+
+/// What a packet has found: parameters, primitives, and the lanes to be asked again.
+pub type Settled = ([f32; RAYS], [u32; RAYS], u32);
+
+/// The lanes that see a triangle from a side on which it can be hit.
+#[inline(always)]
+pub fn accepted(lines: &Lines, at: At, front: u32) -> u32 {
+    match lines.block(at as usize / WIDTH).id[at as usize % WIDTH] & !ID_MASK {
+        SIDES_FRONT => front,
+        SIDES_BACK => !front,
+        _ => u32::MAX,
+    }
+}
+
+impl Corners {
+    /// No triangles.
+    pub const EMPTY: Corners = Corners([[[0.0; RAYS]; 3]; 3]);
+
+    /// Puts the triangle `at` into some lanes.
+    ///
+    /// # Safety
+    /// As for [`Vector::splat`].
+    #[inline(always)]
+    unsafe fn put<V: Vector>(&mut self, lines: &Lines, at: At, axis: [usize; 3], lanes: u32) {
+        let vertex = &lines.block(at as usize / WIDTH).vertex;
+        let at = at as usize % WIDTH;
+        for i in 0..3 {
+            for a in 0..3 {
+                let row = &mut self.0[i][a];
+                // SAFETY: passed on to the caller; rows have `RAYS` numbers.
+                unsafe { V::splat(vertex[i][axis[a]][at]).select(lanes, V::load(row)).store(row) };
+            }
+        }
+    }
+
+    /// Puts the triangle `at` into all lanes.
+    pub fn fill(&mut self, lines: &Lines, at: At, axis: [usize; 3]) {
+        let vertex = &lines.block(at as usize / WIDTH).vertex;
+        let at = at as usize % WIDTH;
+        for (corner, rows) in self.0.iter_mut().zip(vertex) {
+            for (row, k) in corner.iter_mut().zip(axis) {
+                *row = [rows[k][at]; RAYS];
+            }
+        }
+    }
+}
+
+/// The reference test, operation by operation, where none of its special cases arises: lanes that
+/// are neither a hit nor a miss are too close to an edge, seen edge-on, or sheared along another axis
+/// than the frame's.
+///
+/// # Safety
+/// As for [`Vector::splat`].
+#[inline(always)]
+pub unsafe fn judge<L: BeamSimd>(
+    packet: &Packet,
+    corners: &Corners,
+    axis: [usize; 3],
+) -> Judgement {
+    let mut judgement = Judgement { t: [0.0; RAYS], hit: 0, miss: 0, front: 0 };
+    for first in (0..RAYS).step_by(L::Doubles::LANES) {
+        // SAFETY: passed on to the caller; `LANES` divides `RAYS`.
+        unsafe { judge_lanes::<L::Doubles>(packet, corners, axis, first, &mut judgement) };
+    }
+    judgement.hit &= packet.upright;
+    judgement.miss &= packet.upright;
+    judgement
+}
+
+/// The lanes from `first` on.
+#[inline(always)]
+unsafe fn judge_lanes<D: Doubles>(
+    packet: &Packet,
+    corners: &Corners,
+    [kx, ky, kz]: [usize; 3],
+    first: usize,
+    judgement: &mut Judgement,
+) {
+    // SAFETY: passed on to the caller.
+    unsafe {
+        let row = |row: &[f32; RAYS]| D::widen(&row[first..]);
+        let (zero, one) = (D::splat(0.0), D::splat(1.0));
+        let dz = row(&packet.dir[kz]);
+        let (sx, sy) = (row(&packet.dir[kx]).div(dz), row(&packet.dir[ky]).div(dz));
+        let sz = one.div(dz);
+        let [ox, oy, oz] =
+            [row(&packet.origin[kx]), row(&packet.origin[ky]), row(&packet.origin[kz])];
+        let corner = |i: usize| {
+            let z = row(&corners.0[i][2]) - oz;
+            [row(&corners.0[i][0]) - ox - sx * z, row(&corners.0[i][1]) - oy - sy * z, z]
+        };
+        let (a, b, c) = (corner(0), corner(1), corner(2));
+        // Difference and size of the two products of an edge function.
+        let edge = |p: [D; 3], q: [D; 3]| {
+            let (m, n) = (p[0] * q[1], p[1] * q[0]);
+            (m - n, m.abs() + n.abs())
+        };
+        let ((u, pu), (v, pv), (w, pw)) = (edge(c, b), edge(a, c), edge(b, a));
+        let (low, high) = (u.min(v).min(w), u.max(v).max(w));
+        let det = u + v + w;
+        let wide = (D::splat(EDGE_FILTER) * (pu + pv + pw)).le(det.abs());
+        let clear = (zero.lt(low) | high.lt(zero)) & wide;
+        let depth = (u * a[2] + v * b[2] + w * c[2]).div(det);
+        let near = a[2].min(b[2]).min(c[2]);
+        let far = a[2].max(b[2]).max(c[2]);
+        (sz * depth.max(near).min(far)).narrow(&mut judgement.t[first..]);
+        // The range is compared after rounding.
+        let t = row(&judgement.t);
+        let within = row(&packet.t[0]).le(t) & t.le(row(&packet.t[1]));
+        let miss = (low.lt(zero) & zero.lt(high)) | (clear & !within);
+        judgement.hit |= (clear & within) << first;
+        judgement.miss |= miss << first;
+        judgement.front |= zero.lt(det) << first;
+    }
+}
+
+/// Parameters and primitives of what a packet has found: infinity and [`NONE`] where that is nothing.
+/// Last, the lanes whose find the reference test denies, which is never the case.
+///
+/// # Safety
+/// As for [`Vector::splat`].
+#[inline(always)]
+pub unsafe fn settle<L: BeamSimd>(
+    packet: &Packet,
+    corners: &mut Corners,
+    exact: &Exact<'_>,
+    axis: [usize; 3],
+) -> Settled {
+    let mut t = [f32::INFINITY; RAYS];
+    let prim = packet.prim.map(f32::to_bits);
+    // SAFETY: passed on to the caller.
+    let hits = unsafe { gather::<L>(packet, packet.lanes, corners, exact.lines, axis) };
+    if hits == 0 {
+        return (t, prim, 0);
+    }
+    // SAFETY: passed on to the caller.
+    let judgement = unsafe { judge::<L>(packet, corners, axis) };
+    for lane in 0..RAYS {
+        t[lane] = if prim[lane] == NONE { f32::INFINITY } else { judgement.t[lane] };
+    }
+    let (mut open, mut denied) = (hits & !judgement.hit, 0);
+    while open != 0 {
+        let lane = open.trailing_zeros() as usize;
+        open &= open - 1;
+        match exact.hit(packet.index[lane], packet.found[lane].to_bits()) {
+            Some(hit) => t[lane] = hit.t,
+            None => denied |= 1 << lane,
+        }
+    }
+    (t, prim, denied)
+}
+
+/// Puts what some lanes have found into the corners; returns the lanes that have found something.
+///
+/// # Safety
+/// As for [`Vector::splat`].
+#[inline(always)]
+pub unsafe fn gather<L: BeamSimd>(
+    packet: &Packet,
+    lanes: u32,
+    corners: &mut Corners,
+    lines: &Lines,
+    axis: [usize; 3],
+) -> u32 {
+    // SAFETY: passed on to the caller; rows have `RAYS` numbers.
+    unsafe {
+        let found = L::Rays::load(&packet.found);
+        let mut rest = lanes & !found.equals(NONE);
+        let hits = rest;
+        while rest != 0 {
+            let at = packet.found[rest.trailing_zeros() as usize].to_bits();
+            let same = found.equals(at) & rest;
+            rest &= !same;
+            corners.put::<L::Rays>(lines, at, axis, same);
+        }
+        hits
+    }
+}
