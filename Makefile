@@ -48,8 +48,9 @@ fuzz: tools ## Fuzz the NFF reader for FUZZ_SECONDS (needs a nightly toolchain)
 bench: tools ## Rays per second against Embree and other peers, recorded under bench/record
 	@scripts/bench
 
-bench-build: tools ## Time the builder from 10^4 to 10^6 triangles
+bench-build: tools ## Time the builder from 10^4 to 10^6 triangles, and its presets on the benchmark's scenes
 	@$(CARGO) run --release --locked --quiet -p ropewalk-bench --bin build_speed
+	@$(CARGO) run --release --locked --quiet -p ropewalk-bench --bin build_presets
 
 clean: ## Remove everything made here
 	@rm -rf $(OUT) target
