@@ -1,5 +1,4 @@
-//! Planes from samples of the measure (after Shevtsov, Soupikov and Kapustin 2007), settled at
-//! exact positions.
+//! Planes from min-max bins (Shevtsov, Soupikov and Kapustin 2007), settled at exact positions.
 
 use super::tally::{AxisMeasure, Best, LANES, Lanes, Tally, block_width};
 use super::{NodeView, PlaneSearch, SearchBuffers, Sweep, priced_plane};
@@ -12,22 +11,21 @@ use rayon::prelude::*;
 /// Extents within which positions can be spread in `f32`.
 const SPREADABLE: std::ops::Range<f32> = 1e-30..1e30;
 
-/// Candidates that are counted one by one.
+/// Positions of an axis that are tried one by one.
 const MAX_CANDIDATES: usize = 128;
 
 /// Times that the interval around the best sample is sampled again.
 const ZOOMS: usize = 3;
 
-/// The measure of MacDonald and Booth, minimised without sorting. In a large node all three axes are
-/// sampled at [`LANES`] positions; around the cheapest one the axis is sampled again, until few
-/// enough starts and ends of fragments are left to try them all. In a small node all starts and ends
-/// are tried at once, which is the exact minimum.
+/// The measure of MacDonald and Booth, minimised without sorting. In a large node starts and ends of
+/// fragments are counted in [`BINS`] bins an axis; beside the cheapest boundary of bins all starts and
+/// ends are then tried, the interval being sampled again until they are few. In a small node all
+/// starts and ends are tried at once, which is the exact minimum.
 ///
 /// What is returned has true counts and lies at a start or end of a fragment; what may be missed in
-/// a large node is a cheaper plane between samples that look dear.
+/// a large node is a cheaper plane in a bin whose boundaries look dear.
 ///
-/// Deviation: the paper counts starts and ends in bins and adds up the bins; comparing with all
-/// positions at once costs as much and gives the counts themselves.
+/// Deviation: the paper cuts at boundaries of bins.
 pub(crate) struct Binned {
     pub exact: Sweep<'static, MacDonaldBooth>,
     /// Nodes with fewer fragments are searched exactly.
@@ -92,10 +90,13 @@ impl PlaneSearch for Binned {
             let areas = areas[axis].as_ref().filter(|_| tight.min[axis] < tight.max[axis]);
             areas.map(|a| AxisMeasure::new(a, axis, count, width, pricing))
         });
-        let inner = if 2 * count <= MAX_CANDIDATES && count < self.from {
-            tight.best_of_all(fragments, &measures, &mut buffers.candidates)
+        let candidates = &mut buffers.candidates;
+        let inner = if count >= self.from {
+            tight.best_of_bins(fragments, &measures, candidates)
+        } else if 2 * count <= MAX_CANDIDATES {
+            tight.best_of_all(fragments, &measures, candidates)
         } else {
-            tight.best_of_bins(fragments, &measures, &mut buffers.candidates)
+            return self.swept(node, buffers);
         };
         match (face, inner.plane(&areas, count, pricing)) {
             (Some(face), Some(inner)) => Some(if inner.cost < face.cost { inner } else { face }),

@@ -55,7 +55,7 @@ fn node(fragments: &[Fragment], margin: f32) -> NodeView<'_> {
 proptest! {
     #[test]
     fn small_nodes_are_searched_exactly(
-        fragments in fragments(64), leaf_cost in leaf_cost(), margin in prop_oneof![Just(0.0f32), Just(1.0)],
+        fragments in fragments(100), leaf_cost in leaf_cost(), margin in prop_oneof![Just(0.0f32), Just(1.0)],
         size_unit in prop_oneof![Just(0.0), Just(0.5), Just(20.0)]
     ) {
         let (search, view) = (search(leaf_cost, size_unit, usize::MAX), node(&fragments, margin));
