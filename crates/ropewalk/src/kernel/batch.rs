@@ -5,7 +5,6 @@
 use super::beam::{self, BatchReport, BeamQuery, beams};
 use super::events::{BatchEvents, Events, NoEvents};
 use super::level::Level;
-use super::order::{GROUP, Sorter};
 use super::query::{Any, BatchQuery, Closest, Count, Every, Filtered, HitFilter, NoFilter};
 use super::slot::Slot;
 use super::wave::{WAVE, wave};
@@ -16,12 +15,6 @@ use rayon::prelude::*;
 
 /// Rays that one task of a parallel batch traces.
 const TASK: usize = 4096;
-
-/// Bytes of a tree from which on incoherent rays are sorted: several times the last level of cache.
-const LARGE: usize = 64 << 20;
-
-/// Fewer rays than these are not worth sorting.
-const FEWEST_SORTED: usize = 8192;
 
 /// The hits of a batch: one entry a ray.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -120,10 +113,9 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         if self.is_serial(rays) {
             return self.run_coherent(rays, 0, Closest::new(t, prim_id));
         }
-        let task = self.task(rays);
-        let chunks = t.par_chunks_mut(task).zip(prim_id.par_chunks_mut(task));
-        let chunks = rays.par_chunks(task).zip(chunks).enumerate();
-        let run = |(i, (rays, (t, prim)))| self.run_coherent(rays, i * task, Closest::new(t, prim));
+        let chunks = t.par_chunks_mut(TASK).zip(prim_id.par_chunks_mut(TASK));
+        let chunks = rays.par_chunks(TASK).zip(chunks).enumerate();
+        let run = |(i, (rays, (t, prim)))| self.run_coherent(rays, i * TASK, Closest::new(t, prim));
         chunks.map(run).reduce(BatchReport::default, |a, b| a + b)
     }
 
@@ -143,9 +135,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         if self.is_serial(rays) {
             return self.run_coherent(rays, 0, Any { hit });
         }
-        let task = self.task(rays);
-        let chunks = rays.par_chunks(task).zip(hit.par_chunks_mut(task)).enumerate();
-        let run = |(i, (rays, hit))| self.run_coherent(rays, i * task, Any { hit });
+        let chunks = rays.par_chunks(TASK).zip(hit.par_chunks_mut(TASK)).enumerate();
+        let run = |(i, (rays, hit))| self.run_coherent(rays, i * TASK, Any { hit });
         chunks.map(run).reduce(BatchReport::default, |a, b| a + b)
     }
 
@@ -156,10 +147,9 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
             self.run(rays, 0, Count::new(&mut counts, WAVE), |_| ());
             return counts;
         }
-        let task = self.task(rays);
-        let chunks = rays.par_chunks(task).zip(counts.par_chunks_mut(task));
+        let chunks = rays.par_chunks(TASK).zip(counts.par_chunks_mut(TASK));
         chunks.enumerate().for_each(|(i, (rays, counts))| {
-            self.run(rays, i * task, Count::new(counts, WAVE), |_| ());
+            self.run(rays, i * TASK, Count::new(counts, WAVE), |_| ());
         });
         counts
     }
@@ -174,14 +164,13 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         if k == 0 {
             return AllHits { offsets: vec![0; rays.len() + 1], ..AllHits::default() };
         }
-        let task = self.task(rays);
         let gather = |(i, rays): (usize, &[Ray])| {
-            self.run(rays, i * task, Every::new(k, rays.len(), WAVE), |every| every)
+            self.run(rays, i * TASK, Every::new(k, rays.len(), WAVE), |every| every)
         };
         let parts: Vec<Every> = if self.is_serial(rays) {
             vec![gather((0, rays))]
         } else {
-            rays.par_chunks(task).enumerate().map(gather).collect()
+            rays.par_chunks(TASK).enumerate().map(gather).collect()
         };
         let total = parts.iter().map(|p| p.done.len()).sum();
         let mut all = AllHits {
@@ -221,18 +210,6 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         self.threads == 1 || rays.len() <= TASK
     }
 
-    /// Rays of a task of a parallel batch: more where they are sorted, unless that would leave
-    /// threads without work.
-    fn task(&self, rays: &[Ray]) -> usize {
-        let share = rays.len() / (4 * rayon::current_num_threads());
-        if self.is_large() { share.clamp(TASK, GROUP) } else { TASK }
-    }
-
-    /// True if the tree is so much larger than the caches that sorting incoherent rays pays.
-    fn is_large(&self) -> bool {
-        self.tree.bytes() >= LARGE
-    }
-
     /// Coherent rays in beams, the others in the wave.
     fn run_coherent<Q: BeamQuery>(&self, rays: &[Ray], first_ray: usize, query: Q) -> BatchReport {
         if F::FILTERS || !self.beams || self.tree.has_shapes() {
@@ -258,7 +235,6 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
                 #[cfg(not(target_arch = "x86_64"))]
                 _ => unreachable!("only available levels can be chosen"),
             };
-            self.sort(rays, room);
             self.wave::<Q, NoEvents, false>(rays, room, query, &mut NoEvents);
             BatchReport { wave_rays: room.order.len() as u64, ..report }
         })
@@ -281,22 +257,12 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         with_room(|room| {
             room.order.clear();
             room.order.extend(0..rays.len() as u32);
-            self.sort(rays, room);
             if self.tree.has_shapes() {
                 self.wave::<Q, E, true>(rays, room, query, events);
             } else {
                 self.wave::<Q, E, false>(rays, room, query, events);
             }
         });
-    }
-
-    /// Sorts the rays of `room.order` in groups where that pays.
-    fn sort(&self, rays: &[Ray], room: &mut Room) {
-        if self.is_large() && room.order.len() >= FEWEST_SORTED {
-            for group in room.order.chunks_mut(GROUP) {
-                room.sorter.sort(group, rays, self.tree.bounds());
-            }
-        }
     }
 
     /// The rays of `room.order` in the wave.
@@ -337,7 +303,6 @@ struct Room {
     slots: Vec<Slot>,
     beam: Box<beam::Room>,
     order: Vec<u32>,
-    sorter: Sorter,
 }
 
 fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
@@ -349,7 +314,6 @@ fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
             slots: (0..WAVE).map(|_| Slot::new()).collect(),
             beam: Box::new(beam::Room::new()),
             order: Vec::new(),
-            sorter: Sorter::default(),
         }))
     })
 }

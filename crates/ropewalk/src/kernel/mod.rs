@@ -16,7 +16,6 @@ mod exact;
 mod extreme;
 mod level;
 mod list;
-mod order;
 mod query;
 mod scalar;
 mod slot;
