@@ -41,6 +41,7 @@ fn main() -> anyhow::Result<()> {
             let ns = time(&caster, kind.question(), &rays, rounds);
             let events = match kind.question() {
                 Question::Occluded => caster.occluded_events(&rays),
+                Question::AllHits => caster.all_hits_events(&rays),
                 _ => caster.closest_hit_events(&rays),
             };
             let n = rays.len() as f64;

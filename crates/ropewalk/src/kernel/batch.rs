@@ -206,6 +206,13 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         events
     }
 
+    /// What the batch of [`BatchCaster::all_hits`] does, counted, on one thread.
+    pub fn all_hits_events(&self, rays: &[Ray]) -> BatchEvents {
+        let mut events = BatchEvents::default();
+        self.run_counted(rays, &mut Every::new(usize::MAX, rays.len(), WAVE), &mut events);
+        events
+    }
+
     fn is_serial(&self, rays: &[Ray]) -> bool {
         self.threads == 1 || rays.len() <= TASK
     }

@@ -17,52 +17,77 @@ use crate::wide::ID_MASK;
 pub struct Every {
     first: usize,
     /// Hits gathered by each slot.
-    found: Vec<Vec<Found>>,
+    found: Vec<Found>,
     /// Hits of finished rays, in the order in which they finished.
     pub done: Vec<(f32, u32)>,
     /// Where each ray's hits stand in `done`, and how many there are.
     pub range: Vec<(usize, u32)>,
 }
 
-/// A hit: its parameter, or where its triangle lies as long as that is not known.
-#[derive(Clone, Copy)]
+/// The hits of a ray.
+#[derive(Clone, Default)]
 struct Found {
-    prim_id: u32,
-    at: At,
-    t: f32,
+    /// Primitives that are hit for sure, and where their triangles lie.
+    open: Vec<(u32, At)>,
+    /// Keys of the hits whose parameters are known.
+    keys: Vec<u64>,
 }
 
-/// The place of a hit whose parameter is known.
-const SETTLED: At = u32::MAX;
+/// How many of the last primitives found are looked at for the same one in another cell; those that
+/// slip through are dropped later.
+const RECENT: usize = 8;
+
+/// A number that orders hits as they are to be ordered.
+#[inline(always)]
+fn key(t: f32, prim_id: u32) -> u64 {
+    // -0.0 and 0.0 are one parameter; bits of negative numbers run backwards.
+    let bits = (t + 0.0).to_bits();
+    let ordered = bits ^ ((bits as i32 >> 31) as u32 | 1 << 31);
+    u64::from(ordered) << 32 | u64::from(prim_id)
+}
+
+/// The hit that a key stands for.
+#[inline(always)]
+fn hit_of(key: u64) -> (f32, u32) {
+    let ordered = (key >> 32) as u32;
+    let bits = ordered ^ (!(ordered as i32 >> 31) as u32 | 1 << 31);
+    (f32::from_bits(bits), key as u32)
+}
 
 impl Every {
     /// The first `first` hits of `rays` rays, at least one, through `slots` slots.
     pub fn new(first: usize, rays: usize, slots: usize) -> Self {
-        Every { first, found: vec![Vec::new(); slots], done: Vec::new(), range: vec![(0, 0); rays] }
+        Every {
+            first,
+            found: vec![Found::default(); slots],
+            done: Vec::with_capacity(rays),
+            range: vec![(0, 0); rays],
+        }
     }
 
     /// Puts the hits of a ray in order, each once, and drops those beyond the first.
+    #[inline(always)]
     fn settle(&mut self, k: usize, ray: u32, exact: &Exact<'_>) {
-        let found = &mut self.found[k];
-        found.sort_unstable_by_key(|hit| (hit.prim_id, hit.at != SETTLED));
-        found.dedup_by_key(|hit| hit.prim_id);
-        for hit in found.iter_mut().filter(|hit| hit.at != SETTLED) {
-            let settled = exact.hit(ray, hit.at);
-            debug_assert!(settled.is_some(), "a clear hit is a hit");
-            // -0.0 and 0.0 are one parameter.
-            hit.t = settled.map_or(f32::INFINITY, |hit| hit.t + 0.0);
-            hit.at = SETTLED;
+        let Found { open, keys } = &mut self.found[k];
+        for &(_, at) in &open[..] {
+            let hit = exact.hit(ray, at);
+            debug_assert!(hit.is_some(), "a clear hit is a hit");
+            keys.extend(hit.map(|hit| key(hit.t, hit.prim_id)));
         }
-        found.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.prim_id.cmp(&b.prim_id)));
-        found.truncate(self.first);
+        open.clear();
+        keys.sort_unstable();
+        keys.dedup();
+        keys.truncate(self.first);
     }
 
     /// Lowers the limit once there are enough hits.
+    #[inline(always)]
     fn limit(&mut self, k: usize, slot: &mut Slot, exact: &Exact<'_>) {
-        if self.found[k].len() >= self.first.saturating_mul(2) {
+        let Found { open, keys } = &self.found[k];
+        if open.len() + keys.len() >= self.first.saturating_mul(2) {
             self.settle(k, slot.ray, exact);
-            if self.found[k].len() == self.first {
-                slot.limit = self.found[k][self.first - 1].t;
+            if let Some(&last) = self.found[k].keys.get(self.first - 1) {
+                slot.limit = hit_of(last).0;
             }
         }
     }
@@ -79,30 +104,53 @@ impl BatchQuery for Every {
         hits: &Clear<'_>,
         exact: &Exact<'_>,
     ) -> u32 {
+        let open = &mut self.found[k].open;
         let mut lanes = hits.lanes;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize & 7;
             lanes &= lanes - 1;
             let prim_id = hits.block.id[lane] & ID_MASK;
-            self.found[k].push(Found { prim_id, at: place(hits.line, lane), t: 0.0 });
+            let recent = &open[open.len().saturating_sub(RECENT)..];
+            if recent.iter().all(|&(id, _)| id != prim_id) {
+                open.push((prim_id, place(hits.line, lane)));
+            }
         }
         self.limit(k, slot, exact);
         0
     }
 
     fn take(&mut self, k: usize, slot: &mut Slot, hit: &Hit, exact: &Exact<'_>) {
-        self.found[k].push(Found { prim_id: hit.prim_id, at: SETTLED, t: hit.t + 0.0 });
+        self.found[k].keys.push(key(hit.t, hit.prim_id));
         self.limit(k, slot, exact);
     }
 
     fn finish(&mut self, k: usize, slot: &mut Slot, exact: &Exact<'_>) {
         self.settle(k, slot.ray, exact);
-        let found = &mut self.found[k];
-        self.range[slot.ray as usize] = (self.done.len(), found.len() as u32);
-        self.done.extend(found.drain(..).map(|hit| (hit.t, hit.prim_id)));
+        let keys = &mut self.found[k].keys;
+        self.range[slot.ray as usize] = (self.done.len(), keys.len() as u32);
+        self.done.extend(keys.drain(..).map(hit_of));
     }
 
     fn miss(&mut self, index: usize) {
         self.range[index] = (0, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_order_hits() {
+        let ordered =
+            [f32::NEG_INFINITY, -2.5, -1e-40, 0.0, 1e-40, 1.0, 1.0000001, 3e38, f32::INFINITY];
+        for (i, &a) in ordered.iter().enumerate() {
+            assert_eq!(hit_of(key(a, 7)), (a, 7));
+            for &b in &ordered[i + 1..] {
+                assert!(key(a, u32::MAX) < key(b, 0), "{a} {b}");
+            }
+        }
+        assert_eq!(key(-0.0, 1), key(0.0, 1));
+        assert!(key(1.0, 1) < key(1.0, 2));
     }
 }
