@@ -1,9 +1,10 @@
 //! Nanoseconds and counted events per ray of the batch kernels, without peers.
 //!
-//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL]`, names separated by commas.
+//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START]`, names separated by commas;
+//! START is `automatic`, `root` or `entry`.
 
 use anyhow::Context;
-use ropewalk::kernel::{BatchCaster, Level};
+use ropewalk::kernel::{BatchCaster, Level, Start};
 use ropewalk_bench::answer::BenchHit;
 use ropewalk_bench::harness::{Clock, Engine};
 use ropewalk_bench::own::Wave;
@@ -22,11 +23,28 @@ fn main() -> anyhow::Result<()> {
         Some(name) => Level::ALL.into_iter().find(|l| l.name() == name).context("no such level")?,
         None => Level::best(),
     };
+    let start = match arguments.get(4).map_or("automatic", String::as_str) {
+        "automatic" => Start::Automatic,
+        "root" => Start::Root,
+        "entry" => Start::Entry,
+        name => anyhow::bail!("no start {name}"),
+    };
     let catalog =
         Catalog { data: PathBuf::from("../shared/data"), generated: "target/bench-scenes".into() };
     println!(
-        "{:12} {:9} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6}",
-        "scene", "workload", "Mrays/s", "ns/ray", "steps", "leaves", "blocks", "clear", "open"
+        "{:12} {:9} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
+        "scene",
+        "workload",
+        "Mrays/s",
+        "ns/ray",
+        "skip",
+        "looks",
+        "boxed",
+        "steps",
+        "leaves",
+        "blocks",
+        "clear",
+        "open"
     );
     for entry in Catalog::select(&list(0))? {
         let scene = catalog.load(&entry)?;
@@ -38,6 +56,7 @@ fn main() -> anyhow::Result<()> {
             let kind = Kind::named(&name).with_context(|| format!("no workload {name}"))?;
             let rays = generator.workload(kind).rays;
             let caster = engine.caster().with_level(level).context("level not available")?;
+            let caster = caster.with_start(start);
             let ns = time(&caster, kind.question(), &rays, rounds);
             let events = match kind.question() {
                 Question::Occluded => caster.occluded_events(&rays),
@@ -47,9 +66,12 @@ fn main() -> anyhow::Result<()> {
             let n = rays.len() as f64;
             let per = |count: u64| count as f64 / n;
             println!(
-                "{:12} {name:9} {:7.2} {ns:7.1} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
+                "{:12} {name:9} {:7.2} {ns:7.1} {:6.3} {:6.2} {:6.2} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
                 entry.name,
                 1e3 / ns,
+                per(events.skipped),
+                per(events.looked),
+                per(events.boxed),
                 per(events.steps),
                 per(events.leaves),
                 per(events.blocks),

@@ -9,6 +9,7 @@ use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::kernel::BatchCaster;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray};
+use std::cell::RefCell;
 
 /// The wide tree, one batch call a workload, at the best SIMD level of the machine.
 pub struct Wave {
@@ -59,10 +60,18 @@ impl Engine for Wave {
     }
 
     fn closest(&self, rays: &[Ray], out: &mut [BenchHit]) {
-        let hits = self.caster().closest_hit(rays);
-        for ((out, t), prim) in out.iter_mut().zip(hits.t).zip(hits.prim_id) {
-            *out = BenchHit { t, prim };
+        // Arrays are kept, as a caller that asks often keeps its own.
+        thread_local! {
+            static HITS: RefCell<(Vec<f32>, Vec<u32>)> = const { RefCell::new((vec![], vec![])) };
         }
+        HITS.with_borrow_mut(|(t, prim)| {
+            t.resize(rays.len(), 0.0);
+            prim.resize(rays.len(), 0);
+            self.caster().closest_hit_into(rays, t, prim);
+            for ((out, &t), &prim) in out.iter_mut().zip(&*t).zip(&*prim) {
+                *out = BenchHit { t, prim };
+            }
+        });
     }
 
     fn occluded(&self, rays: &[Ray], out: &mut [bool]) {

@@ -3,10 +3,13 @@
 #![allow(unsafe_code)]
 
 use super::beam::{self, BatchReport, BeamQuery, beams};
+use super::entry::Path;
 use super::events::{BatchEvents, Events, NoEvents};
 use super::level::Level;
 use super::query::{Any, BatchQuery, Closest, Count, Every, Filtered, HitFilter, NoFilter};
+use super::scalar::Scalar;
 use super::slot::Slot;
+use super::source::{FromEntry, FromRoot, Source};
 use super::wave::{WAVE, wave};
 use crate::geometry::Geometry;
 use crate::ray::Ray;
@@ -15,6 +18,16 @@ use rayon::prelude::*;
 
 /// Rays that one task of a parallel batch traces.
 const TASK: usize = 4096;
+
+/// One ray in so many is tried before a batch is started, [`MAX_SAMPLE`] at most.
+const RAYS_PER_SAMPLE: usize = 256;
+
+/// See [`RAYS_PER_SAMPLE`].
+const MAX_SAMPLE: usize = 64;
+
+/// The share of rays that the entry search must answer to be worth its time: measured, it loses at
+/// .15 and .24 and wins at .47 and above.
+const WORTHWHILE: f64 = 0.4;
 
 /// The hits of a batch: one entry a ray.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -37,6 +50,21 @@ pub struct AllHits {
     pub prim_id: Vec<u32>,
 }
 
+/// Where the rays of a batch start; it changes no answer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Start {
+    /// At their entries if a sample of them says that this pays, else at the root.
+    #[default]
+    Automatic,
+    /// At the root.
+    Root,
+    /// At the smallest treelet that holds all that they can hit, searched for from where the ray
+    /// before was: for short rays that follow each other, such as the segments of a walk. Rays near
+    /// which there is nothing end there.
+    Entry,
+}
+
 /// Answers batches of rays over a wide tree.
 #[derive(Clone, Copy)]
 pub struct BatchCaster<'a, F = NoFilter> {
@@ -45,6 +73,7 @@ pub struct BatchCaster<'a, F = NoFilter> {
     level: Level,
     threads: usize,
     beams: bool,
+    start: Start,
     filter: F,
 }
 
@@ -57,6 +86,7 @@ impl<'a> BatchCaster<'a> {
             level: Level::best(),
             threads: 0,
             beams: true,
+            start: Start::Automatic,
             filter: NoFilter,
         }
     }
@@ -67,8 +97,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// batch and the hit, or [`Masks`](super::Masks) or [`Opacity`](super::Opacity) from arrays. It
     /// runs inside the traversal; see [`HitFilter`] for what it may rely on.
     pub fn with_filter<G: HitFilter>(self, filter: G) -> BatchCaster<'a, G> {
-        let BatchCaster { tree, geometry, level, threads, beams, .. } = self;
-        BatchCaster { tree, geometry, level, threads, beams, filter }
+        let BatchCaster { tree, geometry, level, threads, beams, start, .. } = self;
+        BatchCaster { tree, geometry, level, threads, beams, start, filter }
     }
 
     /// The same with another level, or `None` if this machine lacks it.
@@ -85,6 +115,11 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// default). The answers are the same.
     pub fn with_beams(self, beams: bool) -> Self {
         BatchCaster { beams, ..self }
+    }
+
+    /// The same with rays started there.
+    pub fn with_start(self, start: Start) -> Self {
+        BatchCaster { start, ..self }
     }
 
     /// The level in use.
@@ -219,9 +254,13 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
 
     /// Coherent rays in beams, the others in the wave.
     fn run_coherent<Q: BeamQuery>(&self, rays: &[Ray], first_ray: usize, query: Q) -> BatchReport {
-        if F::FILTERS || !self.beams || self.tree.has_shapes() {
-            self.run(rays, first_ray, query, |_| ());
-            return BatchReport { wave_rays: rays.len() as u64, ..BatchReport::default() };
+        let search = self.searches(rays);
+        if search || F::FILTERS || !self.beams || self.tree.has_shapes() {
+            let mut filtered = Filtered { query, filter: &self.filter, first_ray };
+            self.run_wave(rays, search, &mut filtered, &mut NoEvents);
+            let wave_rays = rays.len() as u64;
+            let entry_rays = if search { wave_rays } else { 0 };
+            return BatchReport { wave_rays, entry_rays, ..BatchReport::default() };
         }
         let mut query = query;
         with_room(|room| {
@@ -242,7 +281,9 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
                 #[cfg(not(target_arch = "x86_64"))]
                 _ => unreachable!("only available levels can be chosen"),
             };
-            self.wave::<Q, NoEvents, false>(rays, room, query, &mut NoEvents);
+            let width = room.order.len().min(WAVE);
+            let (slots, source) = (&mut room.slots[..width], &mut FromRoot::new(&room.order));
+            self.wave::<Q, _, _, false>(rays, slots, query, source, &mut NoEvents);
             BatchReport { wave_rays: room.order.len() as u64, ..report }
         })
     }
@@ -261,43 +302,94 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     }
 
     fn run_counted<Q: BatchQuery, E: Events>(&self, rays: &[Ray], query: &mut Q, events: &mut E) {
-        with_room(|room| {
-            room.order.clear();
-            room.order.extend(0..rays.len() as u32);
-            if self.tree.has_shapes() {
-                self.wave::<Q, E, true>(rays, room, query, events);
-            } else {
-                self.wave::<Q, E, false>(rays, room, query, events);
-            }
-        });
+        self.run_wave(rays, self.searches(rays), query, events);
     }
 
-    /// The rays of `room.order` in the wave.
-    fn wave<Q: BatchQuery, E: Events, const SHAPES: bool>(
+    /// All rays in the wave, from the root or from their entries.
+    fn run_wave<Q: BatchQuery, E: Events>(
         &self,
         rays: &[Ray],
-        room: &mut Room,
+        search: bool,
         query: &mut Q,
         events: &mut E,
     ) {
-        let (tree, geometry, order) = (self.tree, self.geometry, &room.order[..]);
-        let slots = &mut room.slots[..];
+        with_room(|room| {
+            let width = rays.len().min(WAVE);
+            if let Some(path) = Path::new(self.tree).filter(|_| search) {
+                let (slots, mut source) = (&mut room.slots[..width], FromEntry::new(path));
+                return self.run_source(rays, slots, query, &mut source, events);
+            }
+            room.order.clear();
+            room.order.extend(0..rays.len() as u32);
+            let (slots, mut source) = (&mut room.slots[..width], FromRoot::new(&room.order));
+            self.run_source(rays, slots, query, &mut source, events);
+        });
+    }
+
+    fn run_source<Q: BatchQuery, S: Source, E: Events>(
+        &self,
+        rays: &[Ray],
+        slots: &mut [Slot],
+        query: &mut Q,
+        source: &mut S,
+        events: &mut E,
+    ) {
+        if self.tree.has_shapes() {
+            self.wave::<Q, S, E, true>(rays, slots, query, source, events);
+        } else {
+            self.wave::<Q, S, E, false>(rays, slots, query, source, events);
+        }
+    }
+
+    /// True if the rays are to be searched for their entries.
+    ///
+    /// Searching pays where it answers many rays by itself, so some of them are tried.
+    fn searches(&self, rays: &[Ray]) -> bool {
+        match self.start {
+            Start::Root => return false,
+            Start::Entry => return true,
+            Start::Automatic => {}
+        }
+        let sample = (rays.len() / RAYS_PER_SAMPLE).min(MAX_SAMPLE);
+        if sample == 0 {
+            return false;
+        }
+        let Some(mut path) = Path::new(self.tree) else { return false };
+        let tried = rays.iter().step_by(rays.len() / sample).take(sample);
+        let skipped = tried.filter(|ray| {
+            // SAFETY: portable code; the path is that of the tree.
+            ray.t_max < f32::INFINITY
+                && unsafe { path.enter::<Scalar, _>(self.tree, ray, &mut NoEvents).is_none() }
+        });
+        skipped.count() as f64 >= WORTHWHILE * sample as f64
+    }
+
+    /// The rays of `source` in the wave.
+    fn wave<Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
+        &self,
+        rays: &[Ray],
+        slots: &mut [Slot],
+        query: &mut Q,
+        source: &mut S,
+        events: &mut E,
+    ) {
+        let (tree, geometry) = (self.tree, self.geometry);
         match self.level {
             // SAFETY: portable code.
             Level::Scalar => unsafe {
-                wave::<super::scalar::Scalar, Q, E, SHAPES>(
-                    tree, geometry, rays, order, slots, query, events,
+                wave::<super::scalar::Scalar, Q, S, E, SHAPES>(
+                    tree, geometry, rays, slots, query, source, events,
                 );
             },
             // SAFETY: `with_level` and `Level::best` give only levels this machine has.
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 => unsafe {
-                wave_avx2::<Q, E, SHAPES>(tree, geometry, rays, order, slots, query, events);
+                wave_avx2::<Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events);
             },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => unsafe {
-                wave_avx512::<Q, E, SHAPES>(tree, geometry, rays, order, slots, query, events);
+                wave_avx512::<Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events);
             },
             #[cfg(not(target_arch = "x86_64"))]
             _ => unreachable!("only available levels can be chosen"),
@@ -329,18 +421,18 @@ macro_rules! instantiate {
     ($wave:ident, $beams:ident, $level:ty, $features:literal) => {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
-        fn $wave<Q: BatchQuery, E: Events, const SHAPES: bool>(
+        fn $wave<Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
             tree: &WideTree,
             geometry: &Geometry,
             rays: &[Ray],
-            order: &[u32],
             slots: &mut [Slot],
             query: &mut Q,
+            source: &mut S,
             events: &mut E,
         ) {
             // SAFETY: this function enables the level's features.
             unsafe {
-                wave::<$level, Q, E, SHAPES>(tree, geometry, rays, order, slots, query, events)
+                wave::<$level, Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events)
             }
         }
 

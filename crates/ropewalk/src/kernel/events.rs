@@ -6,6 +6,15 @@ pub trait Events {
     /// A ray is under way.
     #[inline(always)]
     fn ray(&mut self) {}
+    /// A ray is known to hit nothing where it is: no steps, no tests.
+    #[inline(always)]
+    fn skipped(&mut self) {}
+    /// The entry search looks at a treelet.
+    #[inline(always)]
+    fn looked(&mut self) {}
+    /// A segment's box is held against those of a block.
+    #[inline(always)]
+    fn boxed(&mut self) {}
     /// A ray steps through a treelet.
     #[inline(always)]
     fn step(&mut self) {}
@@ -29,8 +38,14 @@ impl Events for NoEvents {}
 /// The events of a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BatchEvents {
-    /// Rays that reach the scene's box.
+    /// Rays that reach the scene's box, those skipped not counted.
     pub rays: u64,
+    /// Rays that the entry search answered: no cell with primitives is near.
+    pub skipped: u64,
+    /// Treelets that the entry search looked at.
+    pub looked: u64,
+    /// Blocks whose boxes were held against that of a segment.
+    pub boxed: u64,
     /// Steps through treelets.
     pub steps: u64,
     /// Leaves visited, the one that ends a ray's stack not counted.
@@ -48,6 +63,15 @@ pub struct BatchEvents {
 impl Events for BatchEvents {
     fn ray(&mut self) {
         self.rays += 1;
+    }
+    fn skipped(&mut self) {
+        self.skipped += 1;
+    }
+    fn looked(&mut self) {
+        self.looked += 1;
+    }
+    fn boxed(&mut self) {
+        self.boxed += 1;
     }
     fn step(&mut self) {
         self.steps += 1;

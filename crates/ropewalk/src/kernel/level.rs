@@ -2,6 +2,7 @@
 
 #![allow(unsafe_code)]
 
+use super::entry::Locate;
 use super::list::{List, Lists};
 use super::slot::{LARGE, Loaded, Slot};
 use crate::aabb::Aabb;
@@ -131,7 +132,7 @@ pub const WEIGHT_SLACK: f32 = 4.0;
 ///
 /// # Safety
 /// The methods may only run on a machine with the level's features.
-pub trait Simd: Copy {
+pub trait Simd: Locate {
     /// [`Slot::load`], which it may call.
     ///
     /// # Safety

@@ -2,6 +2,7 @@
 
 #![allow(unsafe_code)]
 
+use super::entry::{Corners, Locate, REACH, Segment, path};
 use super::level::{DEPTH_SLACK, Found, Nearest, Range, Root, Simd, WEIGHT_SLACK};
 use super::slot::{Loaded, Slot, TINY, later};
 use crate::ray::Ray;
@@ -125,4 +126,66 @@ impl Simd for Scalar {
 
     #[inline(always)]
     unsafe fn prefetch(_address: *const u8) {}
+}
+
+impl Locate for Scalar {
+    #[inline(always)]
+    unsafe fn segment(ray: &Ray, slack: f32) -> Segment {
+        let mut segment = Segment { corners: Corners([0.0; 8]), end: [0.0; 4] };
+        for a in 0..3 {
+            let from = ray.origin[a] + ray.dir[a] * ray.t_min;
+            let to = ray.origin[a] + ray.dir[a] * ray.t_max;
+            segment.corners.0[a] = from.min(to).min(ray.origin[a]) - slack;
+            segment.corners.0[a + 4] = -(from.max(to).max(ray.origin[a]) + slack);
+            segment.end[a] = to;
+        }
+        segment
+    }
+
+    #[inline(always)]
+    unsafe fn lies_in(segment: &Segment, cell: &Corners) -> bool {
+        [0, 1, 2, 4, 5, 6].into_iter().all(|i| segment.corners.0[i] >= cell.0[i])
+    }
+
+    #[inline(always)]
+    unsafe fn reached(segment: &Segment, treelet: &Treelet) -> u32 {
+        let (mut above, mut below, mut used) = (0, 0, 0);
+        for (h, &plane) in treelet.plane.iter().enumerate() {
+            let axis = treelet.axis(h);
+            above |= usize::from(segment.corners.0[axis] >= plane) << h;
+            below |= usize::from(segment.corners.0[axis + 4] >= -plane) << h;
+        }
+        for (child, &code) in treelet.child.iter().enumerate() {
+            used |= u32::from(code != 0) << child;
+        }
+        u32::from(REACH.above[above] & REACH.below[below]) & used
+    }
+
+    #[inline(always)]
+    unsafe fn child_of_end(segment: &Segment, treelet: &Treelet) -> usize {
+        let above = |h: usize| usize::from(segment.end[treelet.axis(h)] >= treelet.plane[h]) << h;
+        REACH.child[(0..7).map(above).sum::<usize>()] as usize
+    }
+
+    #[inline(always)]
+    unsafe fn overlaps(segment: &Segment, block: &Block) -> bool {
+        let meets = |lane: usize, axis: usize| {
+            let [p, q, r] = [0, 1, 2].map(|i| block.vertex[i][axis][lane]);
+            let [low, minus_high] = [segment.corners.0[axis], segment.corners.0[axis + 4]];
+            p.min(q).min(r) <= -minus_high && p.max(q).max(r) >= low
+        };
+        (0..WIDTH).any(|lane| (0..3).all(|axis| meets(lane, axis)))
+    }
+
+    #[inline(always)]
+    unsafe fn narrow(cell: &Corners, treelet: &Treelet, child: usize) -> Corners {
+        let mut corners = *cell;
+        for (level, h) in path(child).into_iter().enumerate() {
+            let upper = child >> (2 - level) & 1 == 1;
+            let plane = if upper { treelet.plane[h] } else { -treelet.plane[h] };
+            let corner = &mut corners.0[treelet.axis(h) + if upper { 0 } else { 4 }];
+            *corner = corner.max(plane);
+        }
+        corners
+    }
 }

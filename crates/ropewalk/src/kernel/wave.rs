@@ -23,6 +23,7 @@ use super::level::{Found, Range, Root, Simd};
 use super::list::{List, Lists};
 use super::query::{BatchQuery, Clear};
 use super::slot::{Loaded, STACK, Slot, earlier};
+use super::source::Source;
 use crate::geometry::Geometry;
 use crate::ray::{PreparedRay, Ray};
 use crate::wide::{BLOCK_LINES, Block, ID_MASK, LINE, WIDTH, WideTree, code_line, code_offset};
@@ -55,41 +56,45 @@ impl Tests {
 }
 
 /// A batch on its way.
-struct Wave<'a, Q, E> {
+struct Wave<'a, Q, S, E> {
     tree: &'a WideTree,
     geometry: &'a Geometry,
     exact: Exact<'a>,
-    order: &'a [u32],
     root: Root,
     slots: &'a mut [Slot],
     query: &'a mut Q,
+    source: &'a mut S,
     events: &'a mut E,
-    next: usize,
+    /// True once the source has no more rays.
+    exhausted: bool,
     lists: Lists,
     /// Rays with the cells that they go to, before they are put on the lists.
     moved: List,
 }
 
-/// Runs the rays that `order` lists through `slots.len()` slots, [`WAVE`] at most.
+/// Runs the rays of `source` through `slots.len()` slots, [`WAVE`] at most.
 ///
 /// # Safety
 /// The machine must have the features of `L`, and the caller must enable them: everything here is
 /// inlined into it.
 #[inline(always)]
-pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
+pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
     tree: &WideTree,
     geometry: &Geometry,
     rays: &[Ray],
-    order: &[u32],
     slots: &mut [Slot],
     query: &mut Q,
+    source: &mut S,
     events: &mut E,
 ) {
     if tree.root() == 0 {
-        order.iter().for_each(|&index| query.miss(index as usize));
+        // SAFETY: passed on to the caller.
+        while let Some((index, _)) = unsafe { source.next::<L, E>(tree, rays, |_| (), events) } {
+            query.miss(index);
+        }
         return;
     }
-    let width = slots.len().min(order.len()).min(WAVE);
+    let width = slots.len().min(WAVE);
     let slots = &mut slots[..width];
     let exact = Exact { lines: tree.lines(), rays };
     let root = Root::new(tree.bounds(), tree.root());
@@ -99,19 +104,19 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
         tree,
         geometry,
         exact,
-        order,
         root,
         slots,
         query,
+        source,
         events,
-        next: 0,
+        exhausted: false,
         lists,
         moved: List::EMPTY,
     };
     loop {
         // SAFETY: passed on to the caller.
         unsafe { wave.refill::<L>() };
-        while wave.lists.free.len == 0 || wave.next == order.len() {
+        while wave.lists.free.len == 0 || wave.exhausted {
             if wave.lists.stepping.len + wave.lists.waiting.len == 0 {
                 wave.query.end(&exact);
                 return;
@@ -127,7 +132,7 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
     }
 }
 
-impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
+impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
     /// Every stepping ray replaces its treelet by the children it reaches.
     ///
     /// Two loops: what a step leaves on the stack is looked at only after all have stepped, so that
@@ -339,21 +344,27 @@ impl<Q: BatchQuery, E: Events> Wave<'_, Q, E> {
         }
     }
 
-    /// Puts the next rays that reach the scene's box into the free slots.
+    /// Puts the next rays that may hit anything into the free slots.
     #[inline(always)]
     unsafe fn refill<L: Simd>(&mut self) {
         let mut n = 0;
-        while self.lists.free.len > 0 && self.next < self.order.len() {
-            let index = self.order[self.next] as usize;
+        while self.lists.free.len > 0 {
+            let (rays, miss) = (self.exact.rays, |index| self.query.miss(index));
+            // SAFETY: passed on to the caller; the codes that come back are those of the tree.
+            let next = unsafe { self.source.next::<L, E>(self.tree, rays, miss, self.events) };
+            let Some((index, code)) = next else {
+                self.exhausted = true;
+                break;
+            };
             let (k, _) = self.lists.free.get(self.lists.free.len - 1);
-            self.next += 1;
-            let (ray, slot) = (&self.exact.rays[index], &mut self.slots[k as usize]);
+            let (ray, slot) = (&rays[index], &mut self.slots[k as usize]);
             // SAFETY: passed on to the caller.
             match unsafe { L::load(slot, ray, index as u32, &self.root) } {
                 Loaded::Ready => {
                     self.events.ray();
                     self.lists.free.len -= 1;
-                    self.moved.set(n, k, self.root.code);
+                    slot.code[1] = code;
+                    self.moved.set(n, k, code);
                     n += 1;
                 }
                 Loaded::Misses => self.query.miss(index),

@@ -166,7 +166,7 @@ pub struct Lanes {
     pub blur: __m256,
 }
 
-const SIGN: __m256 = unsafe { std::mem::transmute::<[f32; 8], __m256>([-0.0; 8]) };
+pub const SIGN: __m256 = unsafe { std::mem::transmute::<[f32; 8], __m256>([-0.0; 8]) };
 
 /// The test without its comparisons.
 ///

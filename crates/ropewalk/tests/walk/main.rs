@@ -3,6 +3,7 @@
 mod beam;
 mod bench;
 mod builders;
+mod entry;
 mod exact;
 mod parts;
 mod ropes;

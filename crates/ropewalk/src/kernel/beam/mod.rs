@@ -116,6 +116,8 @@ pub struct BatchReport {
     pub beam_rays: u64,
     /// Rays answered by the wave.
     pub wave_rays: u64,
+    /// Of these, rays whose entries were searched for; see [`Start`](super::Start).
+    pub entry_rays: u64,
     /// Beams tried.
     pub beams: u64,
     /// Beams that turned out too wide for the tree; their rays were tried again or left to the wave.
@@ -137,6 +139,7 @@ impl std::ops::Add for BatchReport {
         BatchReport {
             beam_rays: self.beam_rays + other.beam_rays,
             wave_rays: self.wave_rays + other.wave_rays,
+            entry_rays: self.entry_rays + other.entry_rays,
             beams: self.beams + other.beams,
             given_up: self.given_up + other.given_up,
             steps: self.steps + other.steps,
