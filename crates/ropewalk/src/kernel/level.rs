@@ -71,6 +71,8 @@ pub struct Root {
     pub bounds: Aabb,
     /// Code of the root cell.
     pub code: u32,
+    /// Largest coordinate of the box.
+    pub reach: f32,
     /// True if the box lies within [`LARGE`](super::slot::LARGE).
     pub is_ordinary: bool,
 }
@@ -79,9 +81,16 @@ impl Root {
     /// The root of a tree.
     pub fn new(bounds: &Aabb, code: u32) -> Root {
         let pad = |[x, y, z]: [f32; 3]| [x, y, z, 0.0];
-        let ordinary = |x: &f32| x.abs() <= LARGE;
-        let is_ordinary = bounds.min.iter().chain(&bounds.max).all(ordinary);
-        Root { min: pad(bounds.min), max: pad(bounds.max), bounds: *bounds, code, is_ordinary }
+        let reach = bounds.min.iter().chain(&bounds.max).fold(0.0f32, |m, x| m.max(x.abs()));
+        let is_ordinary = reach <= LARGE;
+        Root {
+            min: pad(bounds.min),
+            max: pad(bounds.max),
+            bounds: *bounds,
+            code,
+            reach,
+            is_ordinary,
+        }
     }
 }
 

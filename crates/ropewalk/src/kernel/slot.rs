@@ -24,6 +24,9 @@ pub fn earlier(t: f32) -> f32 {
     t - t.abs() * INTERVAL_SLACK
 }
 
+/// See [`Slot::near_zero`].
+pub const NEAR_ZERO: f32 = 1.0 / (1u64 << 36) as f32;
+
 /// See [`Slot::edge_slack`].
 pub const EDGE_SLACK: f32 = 16.0 * f32::EPSILON / 2.0;
 
@@ -87,6 +90,10 @@ pub struct Slot {
     pub best_at: u32,
     /// See `edge_slack`.
     pub half_scale: f32,
+    /// Absolute slack of intervals, on top of the relative one: a hit in a plane through the origin
+    /// has `t = 0`, but `f64` may find it on either side of that, off by at most 2^-41 of the largest
+    /// coordinate over the largest direction component; 2^-36 is kept.
+    pub near_zero: f32,
     /// Index of the top of the stack.
     pub sp: u32,
     /// True if a direction component is zero.
@@ -97,7 +104,7 @@ pub struct Slot {
     pub enter: [f32; STACK],
     /// Where it leaves them.
     pub exit: [f32; STACK],
-    _pad: [u32; 14],
+    _pad: [u32; 13],
 }
 
 const _: () = assert!(size_of::<Slot>() / 64 % 2 == 1);
@@ -119,12 +126,13 @@ impl Slot {
             best_id: 0,
             best_at: 0,
             half_scale: 0.0,
+            near_zero: 0.0,
             sp: 0,
             may_lie_in_plane: false,
             code: [0; STACK],
             enter: [0.0; STACK],
             exit: [0.0; STACK],
-            _pad: [0; 14],
+            _pad: [0; 13],
         }
     }
 
@@ -163,6 +171,10 @@ impl Slot {
             self.start(ray, index);
             return Loaded::Extreme;
         }
+        let coordinates = ray.origin.iter().chain(&bounds.min).chain(&bounds.max);
+        let reach = coordinates.fold(0.0f32, |reach, x| reach.max(x.abs()));
+        self.near_zero = NEAR_ZERO * reach * self.inv[kz].abs();
+        (enter, exit) = (enter - self.near_zero, exit + self.near_zero);
         if !(inside && enter <= later(exit)) {
             return Loaded::Misses;
         }

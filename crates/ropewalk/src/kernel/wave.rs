@@ -217,12 +217,12 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
     fn pop(slot: &mut Slot) -> bool {
         let mut below = (slot.sp as usize).saturating_sub(1).min(STACK - 1);
         if slot.may_lie_in_plane {
-            while below > 0 && earlier(slot.enter[below]) > slot.limit {
+            while below > 0 && earlier(slot.enter[below]) - slot.near_zero > slot.limit {
                 below -= 1;
             }
         }
         slot.sp = below as u32;
-        let behind = earlier(slot.enter[below]) > slot.limit;
+        let behind = earlier(slot.enter[below]) - slot.near_zero > slot.limit;
         (below == 0) | behind | (Q::ANY & (slot.best_id != u32::MAX))
     }
 

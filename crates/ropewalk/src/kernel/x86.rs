@@ -5,7 +5,7 @@
 #![allow(unsafe_code)]
 
 use super::level::{DEPTH_SLACK, Root, WEIGHT_SLACK};
-use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, SMALL, Slot, TINY, later};
+use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
 use crate::ray::Ray;
 use crate::wide::{Block, ORDER, Treelet};
 use std::arch::x86_64::*;
@@ -67,6 +67,9 @@ pub unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loade
         let enter = _mm_cvtss_f32(most(enter));
         let exit = -_mm_cvtss_f32(most(_mm_xor_ps(exit, sign)));
 
+        let start = _mm_blend_ps::<8>(_mm_andnot_ps(sign, origin), _mm_setzero_ps());
+        let reach = _mm_cvtss_f32(_mm_max_ss(most(start), _mm_set_ss(root.reach)));
+
         let order = SHEAR_ORDER.0.get_unchecked(axis.min(2)).as_ptr();
         let order = _mm_load_si128(order.cast());
         let inv_z =
@@ -79,6 +82,8 @@ pub unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loade
         _mm_store_si128(slot.k.as_mut_ptr().cast(), order);
         slot.edge_slack = EDGE_SLACK * _mm_cvtss_f32(longest);
         slot.half_scale = 0.5 * _mm_cvtss_f32(_mm_andnot_ps(sign, inv_z));
+        slot.near_zero = NEAR_ZERO * reach * 2.0 * slot.half_scale;
+        let (enter, exit) = (enter - slot.near_zero, exit + slot.near_zero);
         slot.may_lie_in_plane = false;
         slot.start(ray, index);
         slot.push_root(root.code, enter, exit);

@@ -138,6 +138,31 @@ fn ranges_may_be_negative() {
     check(&geometry, &tree, &rays);
 }
 
+/// Rays that start in the planes of primitives, of cuts and of the scene's box: their hits lie within
+/// `f64` rounding of 0, on either side, and ranges end at them.
+#[test]
+fn hits_about_zero_are_found() {
+    for round in 0..6 {
+        let mut draw = Draw::new(40 + round);
+        let geometry = scenes::grid_quads(&mut draw, 60, 4);
+        let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+        let mut rays = Vec::new();
+        for _ in 0..1500 {
+            let mut ray = generic_ray(&mut draw, &geometry.bounds());
+            ray.origin = draw.point_in(&geometry.bounds());
+            ray.origin[draw.below(3)] = draw.below(9) as f32 - 4.0;
+            let line = ray.with_range(f32::NEG_INFINITY, f32::INFINITY);
+            for (t, _) in every_hit(&geometry, &line) {
+                if t.abs() < 1e-6 {
+                    rays.extend([ray.with_range(-8.0, t), ray.with_range(t, 8.0), line]);
+                }
+            }
+        }
+        assert!(rays.len() > 300, "{}", rays.len());
+        check(&geometry, &tree, &rays);
+    }
+}
+
 #[test]
 fn leaves_of_more_blocks_than_a_code_can_count() {
     let mut draw = Draw::new(8);
