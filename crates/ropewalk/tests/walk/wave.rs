@@ -163,6 +163,33 @@ fn hits_about_zero_are_found() {
     }
 }
 
+/// Origins so far away that neighbouring cells are a few roundings of `t` apart.
+#[test]
+fn far_origins_change_nothing() {
+    for round in 0..8 {
+        let mut draw = Draw::new(60 + round);
+        let geometry = match round % 2 {
+            0 => scenes::grid_quads(&mut draw, 60, 4),
+            _ => scenes::soup(&mut draw, 150, 4.0),
+        };
+        let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+        let mut rays = Vec::new();
+        for _ in 0..1500 {
+            let mut ray = generic_ray(&mut draw, &geometry.bounds());
+            let (inside, away) = (draw.point_in(&geometry.bounds()), draw.uniform(2.0, 6.0));
+            let length = ray.dir.iter().fold(0.0f32, |m, d| m.max(d.abs()));
+            let away = 10f64.powf(away) as f32 / length;
+            ray.origin = std::array::from_fn(|a| inside[a] - away * ray.dir[a]);
+            if let Some(&(t, _)) = every_hit(&geometry, &ray).first() {
+                rays.push(ray.with_range(t * 0.9999, t * 1.0001));
+                rays.push(ray.with_range(t, t));
+            }
+            rays.push(ray);
+        }
+        check(&geometry, &tree, &rays);
+    }
+}
+
 #[test]
 fn leaves_of_more_blocks_than_a_code_can_count() {
     let mut draw = Draw::new(8);
