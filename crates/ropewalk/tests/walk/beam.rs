@@ -261,3 +261,26 @@ fn leaves_of_many_blocks() {
         check(&geometry, &tree, &rays);
     }
 }
+
+/// An eye in the planes of primitives, cuts and the scene's box: hits lie within rounding of 0.
+#[test]
+fn eyes_in_planes_change_nothing() {
+    let mut in_beams = 0.0;
+    for round in 0..10 {
+        let mut draw = Draw::new(90 + round);
+        let geometry = scenes::grid_quads(&mut draw, 60, 4);
+        let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+        for _ in 0..6 {
+            let mut rays = view(&mut draw, &geometry, 16);
+            let mut eye = draw.point_in(&geometry.bounds());
+            eye[draw.below(3)] = draw.below(9) as f32 - 4.0;
+            let low = [0.0, -1.0, f32::NEG_INFINITY][draw.below(3)];
+            for ray in &mut rays {
+                *ray = Ray { origin: eye, ..*ray }.with_range(low, f32::INFINITY);
+            }
+            let [closest, _] = check(&geometry, &tree, &rays);
+            in_beams += share(closest);
+        }
+    }
+    assert!(in_beams > 10.0, "{in_beams}");
+}
