@@ -171,6 +171,7 @@ pub struct Lanes {
     pub blur: __m256,
 }
 
+// SAFETY: both types are eight floats, and any bits are valid in either.
 pub const SIGN: __m256 = unsafe { std::mem::transmute::<[f32; 8], __m256>([-0.0; 8]) };
 
 /// The test without its comparisons.
