@@ -3,6 +3,7 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
+use super::beam::FourDoubles;
 use super::level::{Found, Nearest, Range, Root, Simd};
 use super::slot::{Loaded, Slot};
 use super::x86::{self, Children, Lanes};
@@ -37,6 +38,8 @@ pub static COMPRESS: CompressTable = {
 };
 
 impl Simd for Avx2 {
+    type Doubles = FourDoubles;
+
     #[inline(always)]
     unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loaded {
         // SAFETY: passed on to the caller.
@@ -140,6 +143,18 @@ impl Simd for Avx2 {
             let id = _mm256_and_si256(id, _mm256_set1_epi32(ID_MASK as i32));
             let same = _mm256_cmpeq_epi32(id, _mm256_set1_epi32(prim_id as i32));
             !_mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32 & 0xFF
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn keep(lanes: u32, row: &[u32; WIDTH], kept: &mut [u32; WIDTH]) {
+        // SAFETY: the caller vouches for the features; the loads are of a whole row and one of the
+        // table's 256 entries, the store is as long as the row.
+        unsafe {
+            let order = _mm_loadl_epi64(COMPRESS.0.as_ptr().add(lanes as usize & 255).cast());
+            let row = _mm256_loadu_si256(row.as_ptr().cast());
+            let row = _mm256_permutevar8x32_epi32(row, _mm256_cvtepu8_epi32(order));
+            _mm256_storeu_si256(kept.as_mut_ptr().cast(), row);
         }
     }
 

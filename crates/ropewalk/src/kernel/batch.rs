@@ -194,36 +194,61 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         self.first_hits(rays, usize::MAX)
     }
 
+    /// The same, written over what `all` holds: its memory is used again.
+    pub fn all_hits_into(&self, rays: &[Ray], all: &mut AllHits) {
+        self.first_hits_into(rays, usize::MAX, all);
+    }
+
     /// The first `k` hits of each ray, in order, each once.
     pub fn first_hits(&self, rays: &[Ray], k: usize) -> AllHits {
+        let mut all = AllHits::default();
+        self.first_hits_into(rays, k, &mut all);
+        all
+    }
+
+    /// The same, written over what `all` holds: its memory is used again.
+    pub fn first_hits_into(&self, rays: &[Ray], k: usize, all: &mut AllHits) {
+        all.offsets.clear();
+        all.offsets.resize(rays.len() + 1, 0);
+        all.t.clear();
+        all.prim_id.clear();
         if k == 0 {
-            return AllHits { offsets: vec![0; rays.len() + 1], ..AllHits::default() };
+            return;
         }
         let gather = |(i, rays): (usize, &[Ray])| {
-            self.run(rays, i * TASK, Every::new(k, rays.len(), WAVE), |every| every)
+            let mut every = with_room(|room| std::mem::take(&mut room.every));
+            every.start(k, rays.len(), WAVE);
+            self.run(rays, i * TASK, every, |every| every)
         };
         let parts: Vec<Every> = if self.is_serial(rays) {
             vec![gather((0, rays))]
         } else {
             rays.par_chunks(TASK).enumerate().map(gather).collect()
         };
-        let total = parts.iter().map(|p| p.done.len()).sum();
-        let mut all = AllHits {
-            offsets: Vec::with_capacity(rays.len() + 1),
-            t: Vec::with_capacity(total),
-            prim_id: Vec::with_capacity(total),
+        let total = parts.iter().map(|part| part.len()).sum();
+        all.t.resize(total, 0.0);
+        all.prim_id.resize(total, 0);
+        let (mut offset, mut ends) = (0, &mut all.offsets[1..]);
+        let (mut t, mut prim) = (&mut all.t[..], &mut all.prim_id[..]);
+        let rows = parts.into_iter().map(|part| {
+            let start = offset;
+            offset += part.len();
+            let rows = (
+                split(&mut ends, part.rays()),
+                split(&mut t, part.len()),
+                split(&mut prim, part.len()),
+            );
+            (part, start, rows)
+        });
+        let copy = |(part, offset, (ends, t, prim)): (Every, usize, Rows<'_>)| {
+            part.copy(offset, ends, t, prim);
+            with_room(|room| room.every = part);
         };
-        all.offsets.push(0);
-        for part in parts {
-            for (start, count) in part.range {
-                for &(t, prim) in &part.done[start..][..count as usize] {
-                    all.t.push(t);
-                    all.prim_id.push(prim);
-                }
-                all.offsets.push(all.t.len());
-            }
+        if self.is_serial(rays) {
+            rows.for_each(copy);
+        } else {
+            rows.collect::<Vec<_>>().into_par_iter().for_each(copy);
         }
-        all
     }
 
     /// What the batch of [`BatchCaster::closest_hit`] does, counted, on one thread.
@@ -244,7 +269,9 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// What the batch of [`BatchCaster::all_hits`] does, counted, on one thread.
     pub fn all_hits_events(&self, rays: &[Ray]) -> BatchEvents {
         let mut events = BatchEvents::default();
-        self.run_counted(rays, &mut Every::new(usize::MAX, rays.len(), WAVE), &mut events);
+        let mut every = Every::default();
+        every.start(usize::MAX, rays.len(), WAVE);
+        self.run_counted(rays, &mut every, &mut events);
         events
     }
 
@@ -397,11 +424,20 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     }
 }
 
+/// Ends, parameters and primitives of the rows of some rays.
+type Rows<'a> = (&'a mut [usize], &'a mut [f32], &'a mut [u32]);
+
+/// Splits `n` entries off the front.
+fn split<'a, T>(row: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+    row.split_off_mut(..n).expect("rows are as long as their parts together")
+}
+
 /// What a thread keeps between batches.
 struct Room {
     slots: Vec<Slot>,
     beam: Box<beam::Room>,
     order: Vec<u32>,
+    every: Every,
 }
 
 fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
@@ -413,6 +449,7 @@ fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
             slots: (0..WAVE).map(|_| Slot::new()).collect(),
             beam: Box::new(beam::Room::new()),
             order: Vec::new(),
+            every: Every::default(),
         }))
     })
 }

@@ -18,6 +18,7 @@ mod exact;
 mod extreme;
 mod level;
 mod list;
+mod order;
 mod query;
 mod scalar;
 mod slot;

@@ -118,7 +118,8 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source, E: Events, const SHAPES: b
         unsafe { wave.refill::<L>() };
         while wave.lists.free.len == 0 || wave.exhausted {
             if wave.lists.stepping.len + wave.lists.waiting.len == 0 {
-                wave.query.end(&exact);
+                // SAFETY: passed on to the caller.
+                unsafe { wave.query.settle::<L>(&exact, true) };
                 return;
             }
             // SAFETY: passed on to the caller.
@@ -206,6 +207,8 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             let (k, _) = self.lists.free.get(i);
             self.query.finish(k as usize, &mut self.slots[k as usize], &self.exact);
         }
+        // SAFETY: passed on to the caller.
+        unsafe { self.query.settle::<L>(&self.exact, false) };
     }
 
     /// Takes the cell just visited off the stack; true if nothing is left that matters.
@@ -249,7 +252,13 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             for i in 0..n {
                 let (k, line, left) = tests.get(i);
                 // SAFETY: the codes of a tree lead to its blocks; the rest passed on to the caller.
-                let lanes = unsafe { self.meet_block::<L, SHAPES>(k, line as usize) };
+                let lanes = unsafe {
+                    if Q::MANY {
+                        self.test_all::<L, SHAPES>(k, line as usize)
+                    } else {
+                        self.meet_block::<L, SHAPES>(k, line as usize)
+                    }
+                };
                 met.set(meeting, k, line, lanes);
                 meeting += usize::from(lanes != 0);
                 tests.set(tests.len, k, line + BLOCK_LINES as u32, left - 1);
@@ -262,6 +271,13 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
                     // SAFETY: passed on to the caller.
                     unsafe { L::prefetch(block.wrapping_add(line * LINE)) };
                 }
+            }
+            if Q::MANY {
+                for i in 0..meeting {
+                    let (k, line, lanes) = met.get(i);
+                    self.decide(k, line as usize, lanes);
+                }
+                continue;
             }
             let (mut open, mut unsettled) = (Tests::EMPTY, 0);
             for i in 0..meeting {
@@ -290,6 +306,15 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             self.events.block();
             if SHAPES { lanes | block.shape_lanes() << WIDTH } else { lanes }
         }
+    }
+
+    /// Tests a block in full at once; the lanes that need a decision in `f64`.
+    #[inline(always)]
+    unsafe fn test_all<L: Simd, const SHAPES: bool>(&mut self, k: u32, line: usize) -> u32 {
+        self.events.block();
+        let shapes = if SHAPES { self.tree.lines().block(line).shape_lanes() } else { 0 };
+        // SAFETY: passed on to the caller.
+        unsafe { self.test_block::<L>(k, line, shapes << WIDTH) }
     }
 
     /// Tests a block that the ray of slot `k` meets; the lanes that need a decision in `f64`.

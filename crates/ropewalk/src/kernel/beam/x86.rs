@@ -299,7 +299,6 @@ unsafe fn children(
 impl BeamSimd for Avx2 {
     type Triangles = Eight;
     type Rays = Pair<Eight>;
-    type Doubles = FourDoubles;
 
     #[inline(always)]
     unsafe fn advance(
@@ -357,7 +356,6 @@ impl BeamSimd for Avx2 {
 impl BeamSimd for Avx512 {
     type Triangles = Eight;
     type Rays = Sixteen;
-    type Doubles = EightDoubles;
 
     #[inline(always)]
     unsafe fn advance(

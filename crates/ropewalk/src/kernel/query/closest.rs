@@ -110,7 +110,9 @@ impl BatchQuery for Closest<'_> {
     }
 
     #[inline(always)]
-    fn end(&mut self, exact: &Exact<'_>) {
-        self.settle_pending(exact);
+    unsafe fn settle<L: Simd>(&mut self, exact: &Exact<'_>, all: bool) {
+        if all {
+            self.settle_pending(exact);
+        }
     }
 }

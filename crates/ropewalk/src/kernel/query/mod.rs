@@ -37,6 +37,8 @@ pub struct Clear<'a> {
 pub trait BatchQuery {
     /// True if the first hit ends a ray.
     const ANY: bool;
+    /// True if most blocks are expected to be hit: they are tested in full at once.
+    const MANY: bool = false;
 
     /// Takes hits whose exact parameters may not matter for the slot numbered `k`; the lanes for which
     /// they do are returned and come again by [`BatchQuery::take`].
@@ -60,6 +62,11 @@ pub trait BatchQuery {
     /// Ray `index` misses the scene's box or is invalid.
     fn miss(&mut self, index: usize);
 
-    /// No more rays come.
-    fn end(&mut self, _exact: &Exact<'_>) {}
+    /// Some rays have finished, or all: answers that were put off may be worked out now, in the latter
+    /// case they must be.
+    ///
+    /// # Safety
+    /// As for [`BatchQuery::take_clear`].
+    #[inline(always)]
+    unsafe fn settle<L: Simd>(&mut self, _exact: &Exact<'_>, _all: bool) {}
 }
