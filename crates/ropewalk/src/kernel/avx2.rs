@@ -111,8 +111,8 @@ impl Simd for Avx2 {
             let clear = _mm256_and_ps(reached, whole);
             let open =
                 _mm256_or_ps(_mm256_andnot_ps(inside, meets), _mm256_andnot_ps(clear, reached));
-            let mask = |v| _mm256_movemask_ps(v) as u32;
-            Found { clear: mask(clear), open: mask(open) }
+            let (clear, open) = (_mm256_movemask_ps(clear), _mm256_movemask_ps(open));
+            Found { clear: clear as u32, open: open as u32 }
         }
     }
 

@@ -59,17 +59,9 @@ impl Simd for Avx512 {
                 let code = _mm256_loadu_si256(moved.code.as_ptr().add(from).cast());
                 let leaf = used & _mm256_movepi32_mask(code);
                 let ended = _mm256_mask_testn_epi32_mask(used, code, code);
-                let put = |list: &mut List, mask: u8| {
-                    let slot = _mm256_maskz_compress_epi32(mask, slot);
-                    let code = _mm256_maskz_compress_epi32(mask, code);
-                    let at = list.len & 31;
-                    _mm256_storeu_si256(list.slot.as_mut_ptr().add(at).cast(), slot);
-                    _mm256_storeu_si256(list.code.as_mut_ptr().add(at).cast(), code);
-                    list.len += mask.count_ones() as usize;
-                };
-                put(&mut lists.waiting, leaf);
-                put(&mut lists.stepping, used & !leaf & !ended);
-                put(&mut lists.free, ended);
+                put(&mut lists.waiting, slot, code, leaf);
+                put(&mut lists.stepping, slot, code, used & !leaf & !ended);
+                put(&mut lists.free, slot, code, ended);
                 from += 8;
             }
         }
@@ -164,7 +156,7 @@ impl Simd for Avx512 {
             let keys = keys.as_ptr().cast::<i64>();
             let first = sort(_mm512_mask_loadu_epi64(none, used as u8, keys));
             if n <= WIDTH {
-                return put(none, first, used as u8, t.as_mut_ptr(), prim.as_mut_ptr());
+                return write(none, first, used as u8, t.as_mut_ptr(), prim.as_mut_ptr());
             }
             let rest = (used >> WIDTH) as u8;
             let second = sort(_mm512_mask_loadu_epi64(none, rest, keys.add(WIDTH)));
@@ -173,14 +165,28 @@ impl Simd for Avx512 {
             let low = merge(_mm512_min_epu64(first, second));
             let high = merge(_mm512_max_epu64(first, second));
             let (t, prim) = (t.as_mut_ptr(), prim.as_mut_ptr());
-            let n = put(none, low, 0xFF, t, prim);
-            n + put(low, high, rest, t.add(n), prim.add(n))
+            let n = write(none, low, 0xFF, t, prim);
+            n + write(low, high, rest, t.add(n), prim.add(n))
         }
     }
 
     #[inline(always)]
     unsafe fn prefetch(address: *const u8) {
         x86::prefetch(address);
+    }
+}
+
+/// Appends the lanes of a mask to a list.
+#[inline(always)]
+unsafe fn put(list: &mut List, slot: __m256i, code: __m256i, mask: u8) {
+    // SAFETY: passed on to the caller; a list has room for eight lanes more than there are slots.
+    unsafe {
+        let slot = _mm256_maskz_compress_epi32(mask, slot);
+        let code = _mm256_maskz_compress_epi32(mask, code);
+        let at = list.len & 31;
+        _mm256_storeu_si256(list.slot.as_mut_ptr().add(at).cast(), slot);
+        _mm256_storeu_si256(list.code.as_mut_ptr().add(at).cast(), code);
+        list.len += mask.count_ones() as usize;
     }
 }
 
@@ -231,7 +237,7 @@ unsafe fn sort(x: __m512i) -> __m512i {
 /// Writes the hits of some sorted keys, except those that are like the one before; `last` holds the
 /// one before the first in its last lane. Returns how many.
 #[inline(always)]
-unsafe fn put(last: __m512i, keys: __m512i, used: u8, t: *mut f32, prim: *mut u32) -> usize {
+unsafe fn write(last: __m512i, keys: __m512i, used: u8, t: *mut f32, prim: *mut u32) -> usize {
     // SAFETY: the caller vouches for the features, and for eight lanes at both places.
     unsafe {
         let before = _mm512_alignr_epi64::<7>(keys, last);

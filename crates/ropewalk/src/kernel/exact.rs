@@ -65,21 +65,14 @@ pub struct Met<D> {
 pub unsafe fn meet<D: Doubles>(
     origin: [D; 3],
     [dx, dy, dz]: [D; 3],
-    at: impl Fn(usize, usize) -> D,
+    corners: [[D; 3]; 3],
 ) -> Met<D> {
     // SAFETY: passed on to the caller.
     let (zero, one, share) = unsafe { (D::splat(0.0), D::splat(1.0), D::splat(EDGE_FILTER)) };
     let (sx, sy, sz) = (dx.div(dz), dy.div(dz), one.div(dz));
-    let corner = |i: usize| {
-        let z = at(i, 2) - origin[2];
-        [at(i, 0) - origin[0] - sx * z, at(i, 1) - origin[1] - sy * z, z]
-    };
-    let (a, b, c) = (corner(0), corner(1), corner(2));
-    // Difference and size of the two products of an edge function.
-    let edge = |p: [D; 3], q: [D; 3]| {
-        let (m, n) = (p[0] * q[1], p[1] * q[0]);
-        (m - n, m.abs() + n.abs())
-    };
+    let a = sheared(corners[0], origin, [sx, sy]);
+    let b = sheared(corners[1], origin, [sx, sy]);
+    let c = sheared(corners[2], origin, [sx, sy]);
     let ((u, pu), (v, pv), (w, pw)) = (edge(c, b), edge(a, c), edge(b, a));
     let (low, high) = (u.min(v).min(w), u.max(v).max(w));
     let det = u + v + w;
@@ -93,6 +86,30 @@ pub unsafe fn meet<D: Doubles>(
         miss: low.lt(zero) & zero.lt(high),
         front: zero.lt(det),
     }
+}
+
+/// A corner in the frames of the rays: sheared across, and its depth.
+#[inline(always)]
+fn sheared<D: Doubles>(corner: [D; 3], origin: [D; 3], [sx, sy]: [D; 2]) -> [D; 3] {
+    let z = corner[2] - origin[2];
+    [corner[0] - origin[0] - sx * z, corner[1] - origin[1] - sy * z, z]
+}
+
+/// Difference and size of the two products of an edge function.
+#[inline(always)]
+fn edge<D: Doubles>(p: [D; 3], q: [D; 3]) -> (D, D) {
+    let (m, n) = (p[0] * q[1], p[1] * q[0]);
+    (m - n, m.abs() + n.abs())
+}
+
+/// The lanes of three rows from `first` on.
+///
+/// # Safety
+/// As for [`meet`].
+#[inline(always)]
+pub unsafe fn widen<D: Doubles>([x, y, z]: [&[f32]; 3], first: usize) -> [D; 3] {
+    // SAFETY: passed on to the caller.
+    unsafe { [D::widen(&x[first..]), D::widen(&y[first..]), D::widen(&z[first..])] }
 }
 
 /// Triangles that rays hit for sure, one pair a lane, in the axis order of the ray's shear.
@@ -157,9 +174,13 @@ impl Pairs {
         for first in (0..WIDTH).step_by(D::LANES) {
             // SAFETY: passed on to the caller; `LANES` divides `WIDTH`.
             unsafe {
-                let row = |row: &[f32; WIDTH]| D::widen(&row[first..]);
-                let (origin, dir) = (self.origin.each_ref().map(row), self.dir.each_ref().map(row));
-                let met = meet(origin, dir, |i, a| row(&self.corner[i][a]));
+                let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = &self.corner;
+                let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.dir);
+                let a = widen::<D>([ax, ay, az], first);
+                let b = widen::<D>([bx, by, bz], first);
+                let c = widen::<D>([cx, cy, cz], first);
+                let origin = widen::<D>([ox, oy, oz], first);
+                let met = meet(origin, widen::<D>([dx, dy, dz], first), [a, b, c]);
                 met.t.narrow(&mut t[first..]);
                 hit |= met.hit << first;
             }

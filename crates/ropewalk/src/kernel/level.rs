@@ -19,9 +19,9 @@ use crate::wide::{Block, Treelet, WIDTH};
 pub enum Level {
     /// Portable code, the definition of the others.
     Scalar,
-    /// x86-64 with AVX2 and FMA.
+    /// x86-64 with AVX2, FMA and the bit instructions that came with them.
     Avx2,
-    /// x86-64 with AVX-512 F, VL, BW, DQ.
+    /// The same with AVX-512 F, VL, BW, DQ.
     Avx512,
 }
 
@@ -34,7 +34,14 @@ impl Level {
         match self {
             Level::Scalar => true,
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            Level::Avx2 => {
+                is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                    && is_x86_feature_detected!("bmi1")
+                    && is_x86_feature_detected!("bmi2")
+                    && is_x86_feature_detected!("popcnt")
+                    && is_x86_feature_detected!("lzcnt")
+            }
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => {
                 Level::Avx2.is_available()

@@ -5,7 +5,7 @@
 use super::frame::{NONE, Packet, RAYS};
 use super::shaft::BeamSimd;
 use super::vector::{Doubles, Vector};
-use crate::kernel::exact::{At, Exact, meet};
+use crate::kernel::exact::{At, Exact, meet, widen};
 use crate::wide::{ID_MASK, Lines, SIDES_BACK, SIDES_FRONT, WIDTH};
 
 /// A triangle for each lane: vertices by axis of the frame.
@@ -102,14 +102,20 @@ unsafe fn judge_lanes<D: Doubles>(
 ) {
     // SAFETY: passed on to the caller.
     unsafe {
-        let row = |row: &[f32; RAYS]| D::widen(&row[first..]);
-        let (origin, dir) =
-            (axis.map(|a| row(&packet.origin[a])), axis.map(|a| row(&packet.dir[a])));
-        let met = meet(origin, dir, |i, a| row(&corners.0[i][a]));
+        let [kx, ky, kz] = axis;
+        let (o, d) = (&packet.origin, &packet.dir);
+        let origin = widen::<D>([&o[kx], &o[ky], &o[kz]], first);
+        let dir = widen::<D>([&d[kx], &d[ky], &d[kz]], first);
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = &corners.0;
+        let a = widen::<D>([ax, ay, az], first);
+        let b = widen::<D>([bx, by, bz], first);
+        let c = widen::<D>([cx, cy, cz], first);
+        let met = meet(origin, dir, [a, b, c]);
         met.t.narrow(&mut judgement.t[first..]);
         // The range is compared after rounding.
-        let t = row(&judgement.t);
-        let within = row(&packet.t[0]).le(t) & t.le(row(&packet.t[1]));
+        let t = D::widen(&judgement.t[first..]);
+        let (t_min, t_max) = (D::widen(&packet.t[0][first..]), D::widen(&packet.t[1][first..]));
+        let within = t_min.le(t) & t.le(t_max);
         judgement.hit |= (met.hit & within) << first;
         judgement.miss |= (met.miss | (met.hit & !within)) << first;
         judgement.front |= met.front << first;
