@@ -53,7 +53,7 @@ impl Simd for Avx2 {
         // fit: STACK's doc).
         unsafe {
             let Children { code: children, enter, exit, widened } =
-                x86::children(slot, treelet, sp);
+                x86::children::<Avx2>(slot, treelet, sp);
             let empty = _mm256_cmpeq_epi32(children, _mm256_setzero_si256());
             let reached = _mm256_cmp_ps::<_CMP_LE_OQ>(enter, widened);
             let kept = _mm256_andnot_ps(_mm256_castsi256_ps(empty), reached);
@@ -178,5 +178,20 @@ unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> __m256 {
             _mm256_cmp_ps::<_CMP_GE_OQ>(farthest, t_min),
         );
         _mm256_andnot_ps(outside, meets)
+    }
+}
+
+impl x86::Narrow for Avx2 {
+    #[inline(always)]
+    unsafe fn max<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
+        // SAFETY: the caller vouches for the features; max and min return their second operand where
+        // the first is NaN.
+        unsafe { _mm256_blend_ps::<LANES>(bound, _mm256_max_ps(t, bound)) }
+    }
+
+    #[inline(always)]
+    unsafe fn min<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
+        // SAFETY: as above.
+        unsafe { _mm256_blend_ps::<LANES>(bound, _mm256_min_ps(t, bound)) }
     }
 }

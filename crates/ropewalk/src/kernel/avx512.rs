@@ -33,7 +33,7 @@ impl Simd for Avx512 {
         // fit: STACK's doc).
         unsafe {
             let Children { code: children, enter, exit, widened } =
-                x86::children(slot, treelet, sp);
+                x86::children::<Avx512>(slot, treelet, sp);
             let used = _mm256_test_epi32_mask(children, children);
             let mask = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, widened);
 
@@ -201,6 +201,32 @@ unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> u8 {
         let farthest = _mm256_add_ps(lanes.far, lanes.blur);
         let meets = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(!outside, nearest, limit);
         _mm256_mask_cmp_ps_mask::<_CMP_GE_OQ>(meets, farthest, t_min)
+    }
+}
+
+/// A constant mask that the compiler does not know: it would put a blend behind each masked operation.
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq")]
+fn mask<const LANES: i32>() -> __mmask8 {
+    let mut mask = LANES as u8;
+    // SAFETY: no instruction.
+    unsafe {
+        std::arch::asm!("/* {0} */", inout(kreg) mask, options(pure, nomem, nostack, preserves_flags));
+    }
+    mask
+}
+
+impl x86::Narrow for Avx512 {
+    #[inline(always)]
+    unsafe fn max<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
+        // SAFETY: the caller vouches for the features.
+        unsafe { _mm256_mask_max_ps(bound, mask::<LANES>(), t, bound) }
+    }
+
+    #[inline(always)]
+    unsafe fn min<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
+        // SAFETY: the caller vouches for the features.
+        unsafe { _mm256_mask_min_ps(bound, mask::<LANES>(), t, bound) }
     }
 }
 

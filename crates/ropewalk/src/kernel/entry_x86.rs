@@ -8,7 +8,7 @@ use super::avx512::Avx512;
 use super::entry::{Corners, Locate, REACH, Segment, path};
 use super::x86::SIGN;
 use crate::ray::Ray;
-use crate::wide::{Block, Treelet};
+use crate::wide::{AXIS_SHIFTS, Block, Treelet};
 use std::arch::x86_64::*;
 
 /// [`Locate::segment`].
@@ -55,7 +55,7 @@ unsafe fn lies_in(segment: &Segment, cell: &Corners) -> bool {
 unsafe fn axes(treelet: &Treelet) -> __m256i {
     // SAFETY: passed on to the caller; treelets are aligned.
     unsafe {
-        let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        let shifts = _mm256_loadu_si256(AXIS_SHIFTS.as_ptr().cast());
         _mm256_srlv_epi32(_mm256_set1_epi32(treelet.axes as i32), shifts)
     }
 }
@@ -153,7 +153,7 @@ unsafe fn narrow(cell: &Corners, treelet: &Treelet, child: usize) -> Corners {
         for (level, h) in path(child).into_iter().enumerate() {
             let lower = !(child >> (2 - level)) as u32 & 1;
             let plane = treelet.plane.get_unchecked(h).to_bits() ^ lower << 31;
-            let lane = treelet.axes >> (4 * h) & 3 | lower << 2;
+            let lane = treelet.axis(h) as u32 | lower << 2;
             let here = _mm256_cmpeq_epi32(lanes, _mm256_set1_epi32(lane as i32));
             let plane = _mm256_castsi256_ps(_mm256_set1_epi32(plane as i32));
             let tighter = _mm256_max_ps(corners, plane);

@@ -40,7 +40,6 @@ pub fn order(keys: &mut [u64], t: &mut [f32], prim: &mut [u32]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::level::{Level, Simd};
 
     #[test]
     fn keys_order_hits() {

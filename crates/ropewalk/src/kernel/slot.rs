@@ -2,7 +2,7 @@
 
 use crate::aabb::Aabb;
 use crate::ray::Ray;
-use crate::wide::{LEAF, MAX_WIDE_DEPTH};
+use crate::wide::{Flips, LEAF, MAX_WIDE_DEPTH};
 
 /// Entries of a slot's stack: each treelet on a path replaces one entry by at most eight, and a
 /// store writes eight lanes whatever their number. Slot 0 is the sentinel.
@@ -94,6 +94,8 @@ pub struct Slot {
     /// has `t = 0`, but `f64` may find it on either side of that, off by at most 2^-41 of the largest
     /// coordinate over the largest direction component; 2^-36 is kept.
     pub near_zero: f32,
+    /// Signs of the direction.
+    pub flips: Flips,
     /// Index of the top of the stack.
     pub sp: u32,
     /// True if a direction component is zero.
@@ -104,7 +106,7 @@ pub struct Slot {
     pub enter: [f32; STACK],
     /// Where it leaves them.
     pub exit: [f32; STACK],
-    _pad: [u32; 13],
+    _pad: [u32; 11],
 }
 
 const _: () = assert!(size_of::<Slot>() / 64 % 2 == 1);
@@ -127,12 +129,13 @@ impl Slot {
             best_at: 0,
             half_scale: 0.0,
             near_zero: 0.0,
+            flips: Flips::new(0),
             sp: 0,
             may_lie_in_plane: false,
             code: [0; STACK],
             enter: [0.0; STACK],
             exit: [0.0; STACK],
-            _pad: [0; 13],
+            _pad: [0; 11],
         }
     }
 
@@ -186,6 +189,8 @@ impl Slot {
         self.shear = [ray.dir[kx] * inv_z, ray.dir[ky] * inv_z, inv_z];
         self.edge_slack = EDGE_SLACK * size[kz];
         self.half_scale = 0.5 * inv_z.abs();
+        let sign = |a: usize| u32::from(self.inv[a].is_sign_negative()) << a;
+        self.flips = Flips::new(sign(0) | sign(1) | sign(2));
         self.start(ray, index);
         self.push_root(root, enter, exit);
         Loaded::Ready

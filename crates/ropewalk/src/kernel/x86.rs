@@ -12,7 +12,7 @@
 use super::level::{DEPTH_SLACK, Root, WEIGHT_SLACK};
 use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
 use crate::ray::Ray;
-use crate::wide::{Block, ORDER, Treelet, WIDTH};
+use crate::wide::{AXIS_SHIFTS, Block, Flips, ORDER, Treelet, WIDTH};
 use std::arch::x86_64::*;
 
 /// Axis orders of the shear by its last axis, as indices into a vector; the last lane stays.
@@ -90,6 +90,7 @@ pub unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loade
         slot.near_zero = NEAR_ZERO * reach * 2.0 * slot.half_scale;
         let (enter, exit) = (enter - slot.near_zero, exit + slot.near_zero);
         slot.may_lie_in_plane = false;
+        slot.flips = Flips::new(_mm_movemask_ps(inv) as u32);
         slot.start(ray, index);
         slot.push_root(root.code, enter, exit);
         if enter <= later(exit) { Loaded::Ready } else { Loaded::Misses }
@@ -108,12 +109,30 @@ pub struct Children {
     pub widened: __m256,
 }
 
+/// Bounds made narrower in some lanes, as each level does it best.
+///
+/// # Safety
+/// The methods may only run on a machine with the level's features.
+pub trait Narrow {
+    /// The larger of both in the lanes whose bits are set; NaN in `t` leaves the bound.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn max<const LANES: i32>(bound: __m256, t: __m256) -> __m256;
+
+    /// The smaller of both, likewise.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn min<const LANES: i32>(bound: __m256, t: __m256) -> __m256;
+}
+
 /// The step without its last part: masking and compressing.
 ///
 /// # Safety
 /// The machine must have AVX2 and FMA, and the caller must enable them; `sp` must be on the stack.
 #[inline(always)]
-pub unsafe fn children(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
+pub unsafe fn children<N: Narrow>(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
     debug_assert!(sp < super::slot::STACK);
     // SAFETY: the caller vouches for the features; all loads lie in the aligned treelet, the table
     // (index below 128) and the slot.
@@ -121,31 +140,29 @@ pub unsafe fn children(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
         let origin = _mm256_broadcast_ps(&*slot.origin.as_ptr().cast::<__m128>());
         let inv = _mm256_broadcast_ps(&*slot.inv.as_ptr().cast::<__m128>());
         let planes = _mm256_load_ps(treelet.plane.as_ptr());
-        let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        let shifts = _mm256_loadu_si256(AXIS_SHIFTS.as_ptr().cast());
         let axes = _mm256_srlv_epi32(_mm256_set1_epi32(treelet.axes as i32), shifts);
         let inv = _mm256_permutevar_ps(inv, axes);
         let origin = _mm256_permutevar_ps(origin, axes);
         let t = _mm256_mul_ps(_mm256_sub_ps(planes, origin), inv);
 
-        let signs = _mm256_movemask_ps(inv) as usize & 127;
-        let row = ORDER.0.as_ptr().add(signs).cast::<__m128i>();
-        let packed = _mm256_cvtepu16_epi32(_mm_load_si128(row));
+        let row = ORDER.0.as_ptr().cast::<u8>().add(treelet.order_offset(slot.flips));
+        let packed = _mm256_cvtepu16_epi32(_mm_load_si128(row.cast()));
         let t0 = _mm256_broadcastss_ps(_mm256_castps256_ps128(t));
         let t1 = _mm256_permutevar8x32_ps(t, _mm256_srli_epi32::<3>(packed));
         let t2 = _mm256_permutevar8x32_ps(t, _mm256_srli_epi32::<6>(packed));
         let children = _mm256_load_si256(treelet.child.as_ptr().cast());
         let children = _mm256_permutevar8x32_epi32(children, packed);
 
-        // max and min return their second operand where the first is NaN: such a plane bounds
-        // neither side.
+        // A plane at NaN bounds neither side.
         let enter = _mm256_set1_ps(*slot.enter.get_unchecked(sp));
         let exit = _mm256_set1_ps(*slot.exit.get_unchecked(sp));
-        let enter = _mm256_blend_ps::<0x0F>(enter, _mm256_max_ps(t0, enter));
-        let exit = _mm256_blend_ps::<0xF0>(exit, _mm256_min_ps(t0, exit));
-        let enter = _mm256_blend_ps::<0x33>(enter, _mm256_max_ps(t1, enter));
-        let exit = _mm256_blend_ps::<0xCC>(exit, _mm256_min_ps(t1, exit));
-        let enter = _mm256_blend_ps::<0x55>(enter, _mm256_max_ps(t2, enter));
-        let exit = _mm256_blend_ps::<0xAA>(exit, _mm256_min_ps(t2, exit));
+        let enter = N::max::<0x0F>(enter, t0);
+        let exit = N::min::<0xF0>(exit, t0);
+        let enter = N::max::<0x33>(enter, t1);
+        let exit = N::min::<0xCC>(exit, t1);
+        let enter = N::max::<0x55>(enter, t2);
+        let exit = N::min::<0xAA>(exit, t2);
 
         let size = _mm256_andnot_ps(SIGN, exit);
         let widened = _mm256_fmadd_ps(size, _mm256_set1_ps(INTERVAL_SLACK), exit);

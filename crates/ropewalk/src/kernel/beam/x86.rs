@@ -12,7 +12,7 @@ use crate::kernel::avx2::{Avx2, COMPRESS};
 use crate::kernel::avx512::Avx512;
 use crate::kernel::exact::Exact;
 use crate::kernel::slot::STACK;
-use crate::wide::{ORDER, Treelet, WIDTH};
+use crate::wide::{AXIS_SHIFTS, ORDER, Treelet, WIDTH};
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Range, Sub};
 
@@ -265,7 +265,7 @@ unsafe fn children(
     // the table (index below 128) and the stack.
     unsafe {
         let planes = _mm256_load_ps(treelet.plane.as_ptr());
-        let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        let shifts = _mm256_loadu_si256(AXIS_SHIFTS.as_ptr().cast());
         let axes = _mm256_srlv_epi32(_mm256_set1_epi32(treelet.axes as i32), shifts);
         let (inv, inv_wide) = (by_axis(&shaft.inv, axes), by_axis(&shaft.inv_wide, axes));
         let first = _mm256_sub_ps(planes, by_axis(&shaft.first, axes));
