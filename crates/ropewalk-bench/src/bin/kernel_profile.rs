@@ -1,7 +1,9 @@
 //! Nanoseconds and counted events per ray of the batch kernels, without peers.
 //!
 //! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START]`, names separated by commas;
-//! START is `automatic`, `root` or `entry`.
+//! START is `automatic`, `root` or `entry`, or `single` for one call a ray.
+//!
+//! With the environment variable `PLAIN_CLOCK` time is taken from the wall clock, as Valgrind needs it.
 
 use anyhow::Context;
 use ropewalk::kernel::{BatchCaster, Level, Start};
@@ -11,6 +13,7 @@ use ropewalk_bench::own::Wave;
 use ropewalk_bench::scene::Catalog;
 use ropewalk_bench::workload::{Generator, Kind, Question, Sizes};
 use std::path::PathBuf;
+use std::time::Instant;
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -27,8 +30,10 @@ fn main() -> anyhow::Result<()> {
         "automatic" => Start::Automatic,
         "root" => Start::Root,
         "entry" => Start::Entry,
+        "single" => Start::Root,
         name => anyhow::bail!("no start {name}"),
     };
+    let single = arguments.get(4).is_some_and(|name| name == "single");
     let catalog =
         Catalog { data: PathBuf::from("../shared/data"), generated: "target/bench-scenes".into() };
     println!(
@@ -57,7 +62,7 @@ fn main() -> anyhow::Result<()> {
             let rays = generator.workload(kind).rays;
             let caster = engine.caster().with_level(level).context("level not available")?;
             let caster = caster.with_start(start);
-            let ns = time(&caster, kind.question(), &rays, rounds);
+            let ns = time(&caster, kind.question(), &rays, rounds, single);
             let events = match kind.question() {
                 Question::Occluded => caster.occluded_events(&rays),
                 Question::AllHits => caster.all_hits_events(&rays),
@@ -83,19 +88,53 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Thread CPU time, or wall time where the other cannot be had.
+enum Stopwatch {
+    Thread(Clock),
+    Wall(Instant),
+}
+
+impl Stopwatch {
+    fn start() -> Self {
+        if std::env::var_os("PLAIN_CLOCK").is_some() {
+            Stopwatch::Wall(Instant::now())
+        } else {
+            Stopwatch::Thread(Clock::start())
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        match self {
+            Stopwatch::Thread(clock) => clock.elapsed().0,
+            Stopwatch::Wall(start) => start.elapsed().as_secs_f64(),
+        }
+    }
+}
+
 /// Median nanoseconds of thread CPU time a ray.
 fn time(
     caster: &BatchCaster<'_>,
     question: Question,
     rays: &[ropewalk::Ray],
     rounds: usize,
+    single: bool,
 ) -> f64 {
     let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
     let mut hit = vec![false; rays.len()];
     let mut all: Vec<f64> = (0..rounds)
         .map(|_| {
-            let clock = Clock::start();
+            let clock = Stopwatch::start();
             match question {
+                Question::Occluded if single => {
+                    for (ray, hit) in rays.iter().zip(&mut hit) {
+                        *hit = caster.occluded_one(ray);
+                    }
+                }
+                Question::Closest | Question::Walk if single => {
+                    for (ray, t) in rays.iter().zip(&mut t) {
+                        *t = caster.closest_hit_one(ray).map_or(f32::INFINITY, |hit| hit.t);
+                    }
+                }
                 Question::Occluded => {
                     caster.occluded_into(rays, &mut hit);
                 }
@@ -105,7 +144,7 @@ fn time(
                     caster.closest_hit_into(rays, &mut t, &mut prim);
                 }
             }
-            clock.elapsed().0 * 1e9 / rays.len() as f64
+            clock.seconds() * 1e9 / rays.len() as f64
         })
         .collect();
     all.sort_by(f64::total_cmp);

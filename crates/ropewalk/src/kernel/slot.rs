@@ -113,7 +113,7 @@ const _: () = assert!(size_of::<Slot>() / 64 % 2 == 1);
 
 impl Slot {
     /// A slot without a ray.
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Slot {
             origin: [0.0; 4],
             inv: [0.0; 4],
@@ -194,6 +194,25 @@ impl Slot {
         self.start(ray, index);
         self.push_root(root, enter, exit);
         Loaded::Ready
+    }
+
+    /// Takes the cell just visited off the stack; true if nothing is left that matters, `any` hit
+    /// being enough or not.
+    ///
+    /// Cells are popped in the order in which the ray enters them, so one that starts behind the
+    /// limit ends the ray; except that a ray in a cutting plane is in the cells on both sides at
+    /// once, and then only each cell by itself can be dropped.
+    #[inline(always)]
+    pub fn pop(&mut self, any: bool) -> bool {
+        let mut below = (self.sp as usize).saturating_sub(1).min(STACK - 1);
+        if self.may_lie_in_plane {
+            while below > 0 && earlier(self.enter[below]) - self.near_zero > self.limit {
+                below -= 1;
+            }
+        }
+        self.sp = below as u32;
+        let behind = earlier(self.enter[below]) - self.near_zero > self.limit;
+        (below == 0) | behind | (any & (self.best_id != u32::MAX))
     }
 
     /// Empties the stack but for the root.

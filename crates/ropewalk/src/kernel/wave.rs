@@ -17,16 +17,17 @@
 #![allow(unsafe_code)]
 
 use super::events::Events;
-use super::exact::{Exact, place};
+use super::exact::Exact;
 use super::extreme;
-use super::level::{Found, Range, Root, Simd};
+use super::leaf::Leaves;
+use super::level::{Root, Simd};
 use super::list::{List, Lists};
-use super::query::{BatchQuery, Clear};
-use super::slot::{Loaded, STACK, Slot, earlier};
+use super::query::BatchQuery;
+use super::slot::{Loaded, Slot};
 use super::source::Source;
 use crate::geometry::Geometry;
-use crate::ray::{PreparedRay, Ray};
-use crate::wide::{BLOCK_LINES, Block, ID_MASK, LINE, WIDTH, WideTree, code_line, code_offset};
+use crate::ray::Ray;
+use crate::wide::{BLOCK_LINES, LINE, WIDTH, WideTree, code_line, code_offset};
 
 /// Rays in flight on a core.
 pub const WAVE: usize = 24;
@@ -195,7 +196,7 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             // SAFETY: lists hold numbers of slots; the stack pointer stays on the stack.
             unsafe {
                 let slot = &mut *self.slots.as_mut_ptr().add(k as usize);
-                let ended = Self::pop(slot);
+                let ended = slot.pop(Q::ANY);
                 let code = *slot.code.get_unchecked(slot.sp as usize);
                 self.moved.set(i, k, std::hint::select_unpredictable(ended, 0, code));
             }
@@ -211,24 +212,6 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
         unsafe { self.query.settle::<L>(&self.exact, false) };
     }
 
-    /// Takes the cell just visited off the stack; true if nothing is left that matters.
-    ///
-    /// Cells are popped in the order in which the ray enters them, so one that starts behind the
-    /// limit ends the ray; except that a ray in a cutting plane is in the cells on both sides at
-    /// once, and then only each cell by itself can be dropped.
-    #[inline(always)]
-    fn pop(slot: &mut Slot) -> bool {
-        let mut below = (slot.sp as usize).saturating_sub(1).min(STACK - 1);
-        if slot.may_lie_in_plane {
-            while below > 0 && earlier(slot.enter[below]) - slot.near_zero > slot.limit {
-                below -= 1;
-            }
-        }
-        slot.sp = below as u32;
-        let behind = earlier(slot.enter[below]) - slot.near_zero > slot.limit;
-        (below == 0) | behind | (Q::ANY & (slot.best_id != u32::MAX))
-    }
-
     /// Tests the leaves of the first `n` waiting rays: all first blocks, all second blocks, and so
     /// on, so that no test waits for the outcome of the one before.
     ///
@@ -236,6 +219,8 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
     /// those are tested again in full.
     #[inline(always)]
     unsafe fn test_leaves<L: Simd, const SHAPES: bool>(&mut self, n: usize) {
+        let leaves = Leaves { tree: self.tree, geometry: self.geometry, exact: self.exact };
+        let slots = self.slots.as_mut_ptr();
         let mut tests = Tests::EMPTY;
         for i in 0..n {
             let (k, code) = self.lists.waiting.get(i);
@@ -251,12 +236,18 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             let (mut met, mut meeting) = (Tests::EMPTY, 0);
             for i in 0..n {
                 let (k, line, left) = tests.get(i);
-                // SAFETY: the codes of a tree lead to its blocks; the rest passed on to the caller.
+                self.events.block();
+                // SAFETY: lists hold numbers of slots, the codes of a tree lead to its blocks; the
+                // rest passed on to the caller.
                 let lanes = unsafe {
+                    let (slot, line) = (&mut *slots.add(k as usize), line as usize);
                     if Q::MANY {
-                        self.test_all::<L, SHAPES>(k, line as usize)
+                        let shapes =
+                            if SHAPES { self.tree.lines().block(line).shape_lanes() } else { 0 };
+                        let (slot, lanes) = ((k, slot), shapes << WIDTH);
+                        leaves.test::<L, Q, E>(slot, line, lanes, self.query, self.events)
                     } else {
-                        self.meet_block::<L, SHAPES>(k, line as usize)
+                        leaves.meet::<L, SHAPES>(slot, line)
                     }
                 };
                 met.set(meeting, k, line, lanes);
@@ -272,99 +263,22 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
                     unsafe { L::prefetch(block.wrapping_add(line * LINE)) };
                 }
             }
-            if Q::MANY {
-                for i in 0..meeting {
-                    let (k, line, lanes) = met.get(i);
-                    self.decide(k, line as usize, lanes);
-                }
-                continue;
-            }
             let (mut open, mut unsettled) = (Tests::EMPTY, 0);
-            for i in 0..meeting {
+            for i in 0..if Q::MANY { 0 } else { meeting } {
                 let (k, line, lanes) = met.get(i);
                 // SAFETY: as above.
-                let lanes = unsafe { self.test_block::<L>(k, line as usize, lanes) };
+                let lanes = unsafe {
+                    let slot = (k, &mut *slots.add(k as usize));
+                    leaves.test::<L, Q, E>(slot, line as usize, lanes, self.query, self.events)
+                };
                 open.set(unsettled, k, line, lanes);
                 unsettled += usize::from(lanes != 0);
             }
+            let (open, unsettled) = if Q::MANY { (&met, meeting) } else { (&open, unsettled) };
             for i in 0..unsettled {
                 let (k, line, lanes) = open.get(i);
-                self.decide(k, line as usize, lanes);
-            }
-        }
-    }
-
-    /// The lanes of a block that the ray of slot `k` may hit: triangles in bits 7..0, others in
-    /// bits 15..8.
-    #[inline(always)]
-    unsafe fn meet_block<L: Simd, const SHAPES: bool>(&mut self, k: u32, line: usize) -> u32 {
-        // SAFETY: the caller vouches for the slot, the line and the features.
-        unsafe {
-            let slot = &*self.slots.as_ptr().add(k as usize);
-            let block = &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>();
-            let lanes = L::meets(slot, block);
-            self.events.block();
-            if SHAPES { lanes | block.shape_lanes() << WIDTH } else { lanes }
-        }
-    }
-
-    /// Tests a block in full at once; the lanes that need a decision in `f64`.
-    #[inline(always)]
-    unsafe fn test_all<L: Simd, const SHAPES: bool>(&mut self, k: u32, line: usize) -> u32 {
-        self.events.block();
-        let shapes = if SHAPES { self.tree.lines().block(line).shape_lanes() } else { 0 };
-        // SAFETY: passed on to the caller.
-        unsafe { self.test_block::<L>(k, line, shapes << WIDTH) }
-    }
-
-    /// Tests a block that the ray of slot `k` meets; the lanes that need a decision in `f64`.
-    ///
-    /// No branches: which blocks hold a hit cannot be predicted, and a wrong guess would cost more
-    /// than a test.
-    #[inline(always)]
-    unsafe fn test_block<L: Simd>(&mut self, k: u32, line: usize, lanes: u32) -> u32 {
-        // SAFETY: the caller vouches for the slot, the line and the features.
-        unsafe {
-            let slot = &mut *self.slots.as_mut_ptr().add(k as usize);
-            let block = &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>();
-            let mut range = Range::default();
-            let Found { clear, open } = L::test(slot, block, &mut range);
-            self.events.found(clear, open);
-            let hits = Clear { lanes: clear, range: &range, block, line };
-            open | self.query.take_clear::<L>(k as usize, slot, &hits, &self.exact)
-                | lanes >> WIDTH << WIDTH
-        }
-    }
-
-    /// Decides the lanes of a block exactly: triangles in bits 7..0, others in bits 15..8.
-    #[cold]
-    fn decide(&mut self, k: u32, line: usize, mut lanes: u32) {
-        if lanes >> WIDTH != 0 {
-            self.test_shapes(k, line);
-            lanes &= (1 << WIDTH) - 1;
-        }
-        let slot = &mut self.slots[k as usize];
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            if let Some(hit) = self.exact.hit(slot.ray, place(line, lane)) {
-                self.query.take(k as usize, slot, &hit, &self.exact);
-            }
-            lanes &= lanes - 1;
-        }
-    }
-
-    /// Tests the primitives of a block that are no triangles.
-    fn test_shapes(&mut self, k: u32, line: usize) {
-        let slot = &mut self.slots[k as usize];
-        let block = self.tree.lines().block(line);
-        // `load` has refused what cannot be prepared.
-        let Some(ray) = PreparedRay::new(&self.exact.rays[slot.ray as usize]) else { return };
-        let mut lanes = block.shape_lanes();
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize & (WIDTH - 1);
-            lanes &= lanes - 1;
-            if let Some(hit) = self.geometry.intersect(block.id[lane] & ID_MASK, &ray) {
-                self.query.take(k as usize, slot, &hit, &self.exact);
+                let slot = (k, &mut self.slots[k as usize]);
+                leaves.decide(slot, line as usize, lanes, self.query);
             }
         }
     }

@@ -79,7 +79,7 @@ pub struct Flips {
 impl Flips {
     /// For directions with these signs, the axis' bit set if it is negative.
     #[inline(always)]
-    pub fn new(signs: u32) -> Flips {
+    pub const fn new(signs: u32) -> Flips {
         FLIPS[signs as usize & 7]
     }
 }
