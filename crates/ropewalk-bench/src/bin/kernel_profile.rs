@@ -6,7 +6,7 @@
 //! With the environment variable `PLAIN_CLOCK` time is taken from the wall clock, as Valgrind needs it.
 
 use anyhow::Context;
-use ropewalk::kernel::{BatchCaster, Level, Start};
+use ropewalk::kernel::{AllHits, BatchCaster, Level, Start};
 use ropewalk_bench::answer::BenchHit;
 use ropewalk_bench::harness::{Clock, Engine};
 use ropewalk_bench::own::Wave;
@@ -121,6 +121,7 @@ fn time(
 ) -> f64 {
     let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
     let mut hit = vec![false; rays.len()];
+    let mut all_hits = AllHits::default();
     let mut all: Vec<f64> = (0..rounds)
         .map(|_| {
             let clock = Stopwatch::start();
@@ -138,8 +139,8 @@ fn time(
                 Question::Occluded => {
                     caster.occluded_into(rays, &mut hit);
                 }
-                Question::AllHits => drop(caster.all_hits(rays)),
-                Question::FirstHits(k) => drop(caster.first_hits(rays, k)),
+                Question::AllHits => caster.all_hits_into(rays, &mut all_hits),
+                Question::FirstHits(k) => caster.first_hits_into(rays, k, &mut all_hits),
                 _ => {
                     caster.closest_hit_into(rays, &mut t, &mut prim);
                 }

@@ -6,7 +6,7 @@ use crate::harness::{Builder, Built, Clock, Engine, Family};
 use crate::scene::Mesh;
 use crate::workload::Question;
 use ropewalk::build::{BuildSettings, Preset};
-use ropewalk::kernel::BatchCaster;
+use ropewalk::kernel::{AllHits, BatchCaster};
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray};
 use std::cell::RefCell;
@@ -81,10 +81,15 @@ impl Engine for Wave {
     }
 
     fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
-        let all = self.caster().first_hits(rays, limit);
-        let hits = all.t.into_iter().zip(all.prim_id).map(|(t, prim)| BenchHit { t, prim });
-        let offsets = all.offsets.into_iter().map(|o| o as u32).collect();
-        HitLists { offsets, hits: hits.collect() }
+        thread_local! {
+            static ALL: RefCell<AllHits> = RefCell::default();
+        }
+        ALL.with_borrow_mut(|all| {
+            self.caster().first_hits_into(rays, limit, all);
+            let hits = all.t.iter().zip(&all.prim_id).map(|(&t, &prim)| BenchHit { t, prim });
+            let offsets = all.offsets.iter().map(|&o| o as u32).collect();
+            HitLists { offsets, hits: hits.collect() }
+        })
     }
 }
 

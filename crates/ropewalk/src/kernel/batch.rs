@@ -32,6 +32,9 @@ const MAX_SAMPLE: usize = 64;
 /// .15 and .24 and wins at .47 and above.
 const WORTHWHILE: f64 = 0.4;
 
+/// Room for so many hits, eight bytes each, is kept by a thread between batches.
+const KEPT_HITS: usize = 1 << 22;
+
 /// The hits of a batch: one entry a ray.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BatchHit {
@@ -273,7 +276,9 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         });
         let copy = |(part, offset, (ends, t, prim)): (Every, usize, Rows<'_>)| {
             part.copy(offset, ends, t, prim);
-            with_room(|room| room.every = part);
+            if part.room() <= KEPT_HITS {
+                with_room(|room| room.every = part);
+            }
         };
         if self.is_serial(rays) {
             rows.for_each(copy);

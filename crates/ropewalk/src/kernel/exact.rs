@@ -114,7 +114,7 @@ pub unsafe fn widen<D: Doubles>([x, y, z]: [&[f32]; 3], first: usize) -> [D; 3] 
 
 /// Triangles that rays hit for sure, one pair a lane, in the axis order of the ray's shear.
 #[repr(C, align(64))]
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 pub struct Pairs {
     /// Coordinates by vertex and axis.
     corner: [[[f32; WIDTH]; 3]; 3],

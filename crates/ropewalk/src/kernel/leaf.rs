@@ -45,7 +45,8 @@ impl Leaves<'_> {
         }
     }
 
-    /// Tests a block that the ray of slot `k` meets in `lanes`; the lanes that need a decision in `f64`.
+    /// Tests a block that the ray of slot `k` meets in `lanes`; the lanes that need a decision in `f64`,
+    /// and whether any triangle is hit or may be.
     ///
     /// No branches: which blocks hold a hit cannot be predicted, and a wrong guess would cost more
     /// than a test.
@@ -60,7 +61,7 @@ impl Leaves<'_> {
         lanes: u32,
         query: &mut Q,
         events: &mut E,
-    ) -> u32 {
+    ) -> (u32, bool) {
         // SAFETY: passed on to the caller.
         unsafe {
             let block = self.block(line);
@@ -68,8 +69,8 @@ impl Leaves<'_> {
             let Found { clear, open } = L::test(slot, block, &mut range);
             events.found(clear, open);
             let hits = Clear { lanes: clear, range: &range, block, line };
-            open | query.take_clear::<L>(k as usize, slot, &hits, &self.exact)
-                | lanes >> WIDTH << WIDTH
+            let unclear = query.take_clear::<L>(k as usize, slot, &hits, &self.exact);
+            (open | unclear | lanes >> WIDTH << WIDTH, clear | open != 0)
         }
     }
 

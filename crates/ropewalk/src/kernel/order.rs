@@ -38,6 +38,7 @@ pub fn order(keys: &mut [u64], t: &mut [f32], prim: &mut [u32]) -> usize {
 }
 
 #[cfg(test)]
+#[allow(unsafe_code)]
 mod tests {
     use super::*;
 
@@ -53,5 +54,58 @@ mod tests {
         }
         assert_eq!(key(-0.0, 1), key(0.0, 1));
         assert!(key(1.0, 1) < key(1.0, 2));
+    }
+
+    /// Orders lists of every length with `L`, and keeps every set of lanes.
+    ///
+    /// # Safety
+    /// The machine must have the features of `L`.
+    unsafe fn check<L: Simd>() {
+        let mut draw = 1u32;
+        let mut next = move |n: u32| {
+            draw = draw.wrapping_mul(0x915F_77F5).wrapping_add(1);
+            (draw >> 16) % n
+        };
+        for n in 0..40 {
+            for choices in [1, 3, 1000] {
+                let hit = |_| (next(choices) as f32 - 1.0, next(choices));
+                let mut hits: Vec<(f32, u32)> = (0..n).map(hit).collect();
+                let mut keys: Vec<u64> = hits.iter().map(|&(t, prim)| key(t, prim)).collect();
+                let (mut t, mut prim) = (vec![0.0; room(n)], vec![0; room(n)]);
+                // SAFETY: passed on to the caller.
+                let count = unsafe { L::order(&mut keys, &mut t, &mut prim) };
+                hits.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                hits.dedup();
+                let found: Vec<_> = t.into_iter().zip(prim).take(count).collect();
+                assert_eq!(found, hits);
+            }
+        }
+        let row = [7, 6, 5, 4, 3, 2, 1, 9];
+        for lanes in 0..256 {
+            let mut kept = [0; 8];
+            // SAFETY: passed on to the caller.
+            unsafe { L::keep(lanes, &row, &mut kept) };
+            let expected: Vec<u32> =
+                (0..8).filter(|lane| lanes >> lane & 1 == 1).map(|lane| row[lane]).collect();
+            assert_eq!(kept[..expected.len()], expected);
+        }
+    }
+
+    #[test]
+    fn every_level_orders_and_keeps() {
+        for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+            // SAFETY: the level is available.
+            unsafe {
+                match level {
+                    Level::Scalar => check::<crate::kernel::scalar::Scalar>(),
+                    #[cfg(target_arch = "x86_64")]
+                    Level::Avx2 => check::<crate::kernel::avx2::Avx2>(),
+                    #[cfg(target_arch = "x86_64")]
+                    Level::Avx512 => check::<crate::kernel::avx512::Avx512>(),
+                    #[cfg(not(target_arch = "x86_64"))]
+                    _ => {}
+                }
+            }
+        }
     }
 }

@@ -41,7 +41,7 @@ pub unsafe fn single<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
     let (tree, ray) = (leaves.tree, &leaves.exact.rays[0]);
     // SAFETY: passed on to the caller.
     match unsafe { L::load(slot, ray, 0, root) } {
-        Loaded::Ready => events.ray(),
+        Loaded::Ready => events.rays(1),
         Loaded::Misses => return false,
         Loaded::Extreme => {
             extreme::walk(tree, leaves.geometry, &leaves.exact, (0, slot), query);
@@ -77,7 +77,8 @@ pub unsafe fn single<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
             unsafe {
                 let lanes = leaves.meet::<L, SHAPES>(slot, line);
                 if lanes != 0 {
-                    let open = leaves.test::<L, Q, E>((0, &mut *slot), line, lanes, query, events);
+                    let (open, _) =
+                        leaves.test::<L, Q, E>((0, &mut *slot), line, lanes, query, events);
                     if open != 0 {
                         leaves.decide((0, &mut *slot), line, open, query);
                     }

@@ -32,6 +32,10 @@ use crate::wide::{BLOCK_LINES, LINE, WIDTH, WideTree, code_line, code_offset};
 /// Rays in flight on a core.
 pub const WAVE: usize = 24;
 
+/// The share of blocks that must be hit for a test in full at once to be worth its time: measured,
+/// it wins at .4 and above and loses at .3.
+const WORTHWHILE: f64 = 0.375;
+
 /// Blocks to be tested, each with a number: how many of its leaf are left, or which lanes.
 struct Tests {
     slot: [u32; 32],
@@ -69,6 +73,10 @@ struct Wave<'a, Q, S, E> {
     /// True once the source has no more rays.
     exhausted: bool,
     lists: Lists,
+    /// Blocks looked at.
+    tested: u64,
+    /// Those of them with a triangle that is hit or may be.
+    struck: u64,
     /// Rays with the cells that they go to, before they are put on the lists.
     moved: List,
 }
@@ -112,6 +120,8 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source, E: Events, const SHAPES: b
         events,
         exhausted: false,
         lists,
+        tested: 0,
+        struck: 0,
         moved: List::EMPTY,
     };
     loop {
@@ -216,12 +226,14 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
     /// on, so that no test waits for the outcome of the one before.
     ///
     /// Each block is only looked at first; few of them hold a triangle that the ray may hit, and
-    /// those are tested again in full.
+    /// those are tested again in full. Where a query takes all hits and most blocks have some, they are
+    /// tested in full at once.
     #[inline(always)]
     unsafe fn test_leaves<L: Simd, const SHAPES: bool>(&mut self, n: usize) {
         let leaves = Leaves { tree: self.tree, geometry: self.geometry, exact: self.exact };
         let slots = self.slots.as_mut_ptr();
         let mut tests = Tests::EMPTY;
+        let many = Q::MANY && self.struck as f64 >= WORTHWHILE * self.tested as f64;
         for i in 0..n {
             let (k, code) = self.lists.waiting.get(i);
             let count = self.tree.block_count(code);
@@ -233,6 +245,9 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
         }
         while tests.len > 0 {
             let n = std::mem::take(&mut tests.len);
+            if Q::MANY {
+                self.tested += n as u64;
+            }
             let (mut met, mut meeting) = (Tests::EMPTY, 0);
             for i in 0..n {
                 let (k, line, left) = tests.get(i);
@@ -241,11 +256,14 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
                 // rest passed on to the caller.
                 let lanes = unsafe {
                     let (slot, line) = (&mut *slots.add(k as usize), line as usize);
-                    if Q::MANY {
+                    if many {
                         let shapes =
                             if SHAPES { self.tree.lines().block(line).shape_lanes() } else { 0 };
                         let (slot, lanes) = ((k, slot), shapes << WIDTH);
-                        leaves.test::<L, Q, E>(slot, line, lanes, self.query, self.events)
+                        let (open, struck) =
+                            leaves.test::<L, Q, E>(slot, line, lanes, self.query, self.events);
+                        self.struck += u64::from(struck);
+                        open
                     } else {
                         leaves.meet::<L, SHAPES>(slot, line)
                     }
@@ -264,17 +282,20 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
                 }
             }
             let (mut open, mut unsettled) = (Tests::EMPTY, 0);
-            for i in 0..if Q::MANY { 0 } else { meeting } {
+            for i in 0..if many { 0 } else { meeting } {
                 let (k, line, lanes) = met.get(i);
                 // SAFETY: as above.
-                let lanes = unsafe {
+                let (lanes, struck) = unsafe {
                     let slot = (k, &mut *slots.add(k as usize));
                     leaves.test::<L, Q, E>(slot, line as usize, lanes, self.query, self.events)
                 };
+                if Q::MANY {
+                    self.struck += u64::from(struck);
+                }
                 open.set(unsettled, k, line, lanes);
                 unsettled += usize::from(lanes != 0);
             }
-            let (open, unsettled) = if Q::MANY { (&met, meeting) } else { (&open, unsettled) };
+            let (open, unsettled) = if many { (&met, meeting) } else { (&open, unsettled) };
             for i in 0..unsettled {
                 let (k, line, lanes) = open.get(i);
                 let slot = (k, &mut self.slots[k as usize]);
@@ -298,17 +319,24 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             let (k, _) = self.lists.free.get(self.lists.free.len - 1);
             let (ray, slot) = (&rays[index], &mut self.slots[k as usize]);
             // SAFETY: passed on to the caller.
-            match unsafe { L::load(slot, ray, index as u32, &self.root) } {
-                Loaded::Ready => {
-                    self.events.ray();
-                    self.lists.free.len -= 1;
-                    slot.code[1] = code;
-                    self.moved.set(n, k, code);
-                    n += 1;
-                }
-                Loaded::Misses => self.query.miss(index),
-                Loaded::Extreme => self.walk_extreme(k),
+            let loaded = unsafe { L::load(slot, ray, index as u32, &self.root) };
+            if loaded == Loaded::Extreme {
+                self.walk_extreme(k);
+                continue;
             }
+            let ready = usize::from(loaded == Loaded::Ready);
+            if Q::MANY {
+                // Without a branch, since which chords miss the scene's box cannot be predicted: the
+                // next ray overwrites what such a ray leaves, and hits overwrite this.
+                self.query.miss(index);
+            } else if ready == 0 {
+                self.query.miss(index);
+                continue;
+            }
+            slot.code[1] = code;
+            self.moved.set(n, k, code);
+            (n, self.lists.free.len) = (n + ready, self.lists.free.len - ready);
+            self.events.rays(ready);
         }
         // SAFETY: passed on to the caller.
         unsafe { self.enlist::<L>(n) };

@@ -296,6 +296,15 @@ fn threads_do_not_change_answers() {
     assert_eq!(all.closest_hit(&rays), one.closest_hit(&rays));
     assert_eq!(all.occluded(&rays), one.occluded(&rays));
     assert_eq!(all.all_hits(&rays), one.all_hits(&rays));
+    let mut kept = AllHits::default();
+    for (rays, k) in [(&rays[..], 8), (&rays[..5000], 1), (&rays[..100], usize::MAX), (&[], 2)] {
+        for caster in [all, one] {
+            caster.first_hits_into(rays, k, &mut kept);
+            assert_eq!(kept, one.first_hits(rays, k));
+        }
+    }
+    one.first_hits_into(&rays[..3], 0, &mut kept);
+    assert_eq!((kept.offsets, kept.t), (vec![0; 4], vec![]));
 }
 
 /// A filter may ask about other rays, and the calls do not disturb each other.

@@ -67,6 +67,13 @@ struct Finished {
 /// So many hits at least are settled at once: these do not wait for each other.
 const PENDING: usize = 64;
 
+/// How many hits a ray has when its limit is first looked at: that is not worth its time if few more
+/// are to come.
+#[inline(always)]
+fn due(first: usize) -> usize {
+    first.saturating_add(first / 2)
+}
+
 impl Found {
     #[cold]
     fn grow(&mut self) {
@@ -77,7 +84,7 @@ impl Found {
     }
 
     fn clear(&mut self, first: usize) {
-        (self.len, self.due) = (0, first);
+        (self.len, self.due) = (0, due(first));
         self.keys.clear();
     }
 }
@@ -171,6 +178,11 @@ impl Every {
     /// How many rays there are.
     pub fn rays(&self) -> usize {
         self.range.len()
+    }
+
+    /// For how many hits there is room.
+    pub fn room(&self) -> usize {
+        self.t.len()
     }
 
     /// How many hits there are in all.
@@ -276,7 +288,7 @@ impl Every {
             return;
         }
         slot.limit = slot.limit.min(t[self.first - 1]);
-        found.due = n + (self.first / 8).max(1);
+        found.due = n + (self.first / 4).max(1);
     }
 }
 
@@ -338,7 +350,7 @@ impl BatchQuery for Every {
         if found.len > 0 {
             self.finished.push(Sheared::new(slot, exact.rays), found);
         }
-        (found.len, found.due) = (0, self.first);
+        (found.len, found.due) = (0, due(self.first));
     }
 
     fn miss(&mut self, index: usize) {

@@ -37,7 +37,8 @@ pub struct Clear<'a> {
 pub trait BatchQuery {
     /// True if the first hit ends a ray.
     const ANY: bool;
-    /// True if most blocks are expected to be hit: they are tested in full at once.
+    /// True if hits end no ray, so that blocks may well have several: they are tested in full at once
+    /// where that pays.
     const MANY: bool = false;
 
     /// Takes hits whose exact parameters may not matter for the slot numbered `k`; the lanes for which
@@ -59,7 +60,7 @@ pub trait BatchQuery {
     /// The ray of slot `k` has seen every cell that matters.
     fn finish(&mut self, k: usize, slot: &mut Slot, exact: &Exact<'_>);
 
-    /// Ray `index` misses the scene's box or is invalid.
+    /// Ray `index` hits nothing, unless [`BatchQuery::finish`] says otherwise later on.
     fn miss(&mut self, index: usize);
 
     /// Some rays have finished, or all: answers that were put off may be worked out now, in the latter
