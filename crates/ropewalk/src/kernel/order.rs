@@ -17,9 +17,9 @@ pub fn hit_of(key: u64) -> (f32, u32) {
     (f32::from_bits(bits), key as u32)
 }
 
-/// The room that a list of so many hits needs while it is put in order.
+/// The room that a list of so many hits needs while it is put in order: whole stores, one at least.
 pub const fn room(hits: usize) -> usize {
-    hits.next_multiple_of(8)
+    if hits == 0 { 8 } else { hits.next_multiple_of(8) }
 }
 
 /// [`Simd::order`](super::level::Simd::order).
