@@ -41,6 +41,7 @@ pub fn order(keys: &mut [u64], t: &mut [f32], prim: &mut [u32]) -> usize {
 #[allow(unsafe_code)]
 mod tests {
     use super::*;
+    use crate::kernel::level::{Level, Simd};
 
     #[test]
     fn keys_order_hits() {
