@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code)]
 
-use super::beam::{self, BatchReport, BeamQuery, beams};
+use super::beam::{self, Answers, BatchReport, BeamQuery, Walk, beams};
 use super::entry::Path;
 use super::events::{BatchEvents, Events, NoEvents};
 use super::exact::Exact;
@@ -12,6 +12,7 @@ use super::query::{Any, BatchQuery, Closest, Count, Every, Filtered, HitFilter, 
 use super::scalar::Scalar;
 use super::single::{single, with_slot};
 use super::slot::Slot;
+use super::sorted::{GROUP, SMALLEST, Sorter, Sorting};
 use super::source::{FromEntry, FromRoot, Source};
 use super::wave::{WAVE, wave};
 use crate::geometry::Geometry;
@@ -81,6 +82,7 @@ pub struct BatchCaster<'a, F = NoFilter> {
     threads: usize,
     beams: bool,
     start: Start,
+    sorting: Sorting,
     filter: F,
 }
 
@@ -95,6 +97,7 @@ impl<'a> BatchCaster<'a> {
             threads: 0,
             beams: true,
             start: Start::Automatic,
+            sorting: Sorting::Automatic,
             filter: NoFilter,
         }
     }
@@ -105,8 +108,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// batch and the hit, or [`Masks`](super::Masks) or [`Opacity`](super::Opacity) from arrays. It
     /// runs inside the traversal; see [`HitFilter`] for what it may rely on.
     pub fn with_filter<G: HitFilter>(self, filter: G) -> BatchCaster<'a, G> {
-        let BatchCaster { tree, geometry, root, level, threads, beams, start, .. } = self;
-        BatchCaster { tree, geometry, root, level, threads, beams, start, filter }
+        let BatchCaster { tree, geometry, root, level, threads, beams, start, sorting, .. } = self;
+        BatchCaster { tree, geometry, root, level, threads, beams, start, sorting, filter }
     }
 
     /// The same with another level, or `None` if this machine lacks it.
@@ -128,6 +131,11 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// The same with rays started there.
     pub fn with_start(self, start: Start) -> Self {
         BatchCaster { start, ..self }
+    }
+
+    /// The same with incoherent rays sorted by where they start, or not. The answers are the same.
+    pub fn with_sorting(self, sorting: Sorting) -> Self {
+        BatchCaster { sorting, ..self }
     }
 
     /// The level in use.
@@ -156,9 +164,10 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         if self.is_serial(rays) {
             return self.run_coherent(rays, 0, Closest::new(t, prim_id));
         }
-        let chunks = t.par_chunks_mut(TASK).zip(prim_id.par_chunks_mut(TASK));
-        let chunks = rays.par_chunks(TASK).zip(chunks).enumerate();
-        let run = |(i, (rays, (t, prim)))| self.run_coherent(rays, i * TASK, Closest::new(t, prim));
+        let task = self.task(rays);
+        let chunks = t.par_chunks_mut(task).zip(prim_id.par_chunks_mut(task));
+        let chunks = rays.par_chunks(task).zip(chunks).enumerate();
+        let run = |(i, (rays, (t, prim)))| self.run_coherent(rays, i * task, Closest::new(t, prim));
         chunks.map(run).reduce(BatchReport::default, |a, b| a + b)
     }
 
@@ -178,8 +187,9 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         if self.is_serial(rays) {
             return self.run_coherent(rays, 0, Any { hit });
         }
-        let chunks = rays.par_chunks(TASK).zip(hit.par_chunks_mut(TASK)).enumerate();
-        let run = |(i, (rays, hit))| self.run_coherent(rays, i * TASK, Any { hit });
+        let task = self.task(rays);
+        let chunks = rays.par_chunks(task).zip(hit.par_chunks_mut(task)).enumerate();
+        let run = |(i, (rays, hit))| self.run_coherent(rays, i * task, Any { hit });
         chunks.map(run).reduce(BatchReport::default, |a, b| a + b)
     }
 
@@ -360,11 +370,39 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
                 #[cfg(not(target_arch = "x86_64"))]
                 _ => unreachable!("only available levels can be chosen"),
             };
+            let wave_rays = room.order.len() as u64;
+            if self.sorts(rays, &room.order) {
+                let Room { order, all, slots, sorter, answers, .. } = room;
+                for order in order.chunks(GROUP) {
+                    sorter.sort(self.tree.bounds(), rays, order);
+                    all.extend(all.len() as u32..order.len() as u32);
+                    let order = &all[..order.len()];
+                    let walk = Moved { caster: self, rays: &sorter.rays, order, slots };
+                    query.ask_moved(&sorter.stood, answers, walk);
+                }
+                return BatchReport { wave_rays, sorted_rays: wave_rays, ..report };
+            }
             let width = room.order.len().min(WAVE);
             let (slots, source) = (&mut room.slots[..width], &mut FromRoot::new(&room.order));
             self.wave::<Q, _, _, false>(rays, slots, query, source, &mut NoEvents);
-            BatchReport { wave_rays: room.order.len() as u64, ..report }
+            BatchReport { wave_rays, ..report }
         })
+    }
+
+    /// Rays of a task: few, for balance, or as many as are worth sorting.
+    fn task(&self, rays: &[Ray]) -> usize {
+        let sorts = self.sorting == Sorting::Automatic && self.tree.bytes() >= SMALLEST;
+        let share = rays.len() / (4 * rayon::current_num_threads());
+        if sorts { share.clamp(TASK, GROUP) } else { TASK }
+    }
+
+    /// True if the rays left to the wave are to be sorted.
+    fn sorts(&self, rays: &[Ray], order: &[u32]) -> bool {
+        match self.sorting {
+            Sorting::Always => true,
+            Sorting::Never => false,
+            Sorting::Automatic => Sorter::pays(self.tree.bounds(), self.tree.bytes(), rays, order),
+        }
     }
 
     /// Puts `rays`, the first of which is `first_ray` in the batch, to `query` in the wave.
@@ -539,6 +577,27 @@ struct Room {
     beam: Box<beam::Room>,
     order: Vec<u32>,
     every: Every,
+    sorter: Sorter,
+    answers: Answers,
+    /// 0, 1, 2 and so on, as far as it was needed.
+    all: Vec<u32>,
+}
+
+/// Rays that have been moved, to be walked in their new order.
+struct Moved<'a, 'c, F> {
+    caster: &'a BatchCaster<'c, F>,
+    rays: &'a [Ray],
+    /// All indices of `rays`, ascending.
+    order: &'a [u32],
+    slots: &'a mut [Slot],
+}
+
+impl<F: HitFilter> Walk for Moved<'_, '_, F> {
+    fn walk<Q: BatchQuery>(self, query: &mut Q) {
+        let slots = &mut self.slots[..self.rays.len().min(WAVE)];
+        let source = &mut FromRoot::new(self.order);
+        self.caster.wave::<Q, _, _, false>(self.rays, slots, query, source, &mut NoEvents);
+    }
 }
 
 fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
@@ -551,6 +610,9 @@ fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
             beam: Box::new(beam::Room::new()),
             order: Vec::new(),
             every: Every::default(),
+            sorter: Sorter::default(),
+            answers: Answers::default(),
+            all: Vec::new(),
         }))
     })
 }

@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, coordinates};
 use crate::scenes;
-use ropewalk::kernel::{AllHits, BatchCaster, HitFilter, Level, Masks, Opacity};
+use ropewalk::kernel::{AllHits, BatchCaster, HitFilter, Level, Masks, Opacity, Sorting};
 use ropewalk::primitive::Triangle;
 use ropewalk::ray::PreparedRay;
 use ropewalk::traverse::{BruteForce, NoCounts, RayCaster};
@@ -305,6 +305,34 @@ fn threads_do_not_change_answers() {
     }
     one.first_hits_into(&rays[..3], 0, &mut kept);
     assert_eq!((kept.offsets, kept.t), (vec![0; 4], vec![]));
+}
+
+/// Also where only some rays are left to the wave, and with fewer rays than it holds.
+#[test]
+fn sorting_does_not_change_answers() {
+    let mut draw = Draw::new(29);
+    let geometry = scenes::soup(&mut draw, 300, 1.0);
+    let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+    let wide = WideTree::compile(&tree, &geometry).unwrap();
+    let bounds = geometry.bounds();
+    let mut rays: Vec<_> = (0..20_000).map(|_| generic_ray(&mut draw, &bounds)).collect();
+    let eye = rays[0];
+    for i in (5000..9000).chain(9500..9516) {
+        let end = rays[i].origin;
+        rays[i] = Ray::new(eye.origin, std::array::from_fn(|a| end[a] - eye.origin[a]));
+    }
+    (rays[3].origin[1], rays[7].dir) = (f32::NAN, [0.0; 3]);
+    let never = BatchCaster::new(&wide, &geometry).with_sorting(Sorting::Never).with_threads(1);
+    let always = never.with_sorting(Sorting::Always);
+    for rays in [&rays[..], &rays[4000..9800], &rays[..17], &rays[..1], &[]] {
+        assert_eq!(always.closest_hit(rays), never.closest_hit(rays));
+        assert_eq!(always.occluded(rays), never.occluded(rays));
+        assert_eq!(always.with_threads(0).closest_hit(rays), never.closest_hit(rays));
+        let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
+        let report = always.closest_hit_into(rays, &mut t, &mut prim);
+        assert_eq!(report.sorted_rays + report.beam_rays, rays.len() as u64);
+        assert_eq!(report.sorted_rays, report.wave_rays);
+    }
 }
 
 /// A filter may ask about other rays, and the calls do not disturb each other.

@@ -91,6 +91,24 @@ pub trait BeamQuery: BatchQuery {
     /// Takes the answers of some lanes: parameters and primitives, infinite and [`NONE`] for misses.
     /// Any-hit queries look at the primitives only.
     fn answer(&mut self, rays: &[u32; RAYS], lanes: u32, t: &[f32; RAYS], prim_id: &[u32; RAYS]);
+
+    /// Lets `walk` put the same question to rays that have been moved, and answers them where they
+    /// stood.
+    fn ask_moved(&mut self, stood: &[u32], answers: &mut Answers, walk: impl Walk);
+}
+
+/// A walk that any query may be put to.
+pub trait Walk {
+    /// Answers all rays.
+    fn walk<Q: BatchQuery>(self, query: &mut Q);
+}
+
+/// Answers of rays that have been moved.
+#[derive(Default)]
+pub struct Answers {
+    t: Vec<f32>,
+    prim: Vec<u32>,
+    hit: Vec<bool>,
 }
 
 impl BeamQuery for Closest<'_> {
@@ -101,6 +119,17 @@ impl BeamQuery for Closest<'_> {
             self.prim[rays[lane] as usize] = prim_id[lane];
         }
     }
+
+    fn ask_moved(&mut self, stood: &[u32], answers: &mut Answers, walk: impl Walk) {
+        let Answers { t, prim, .. } = answers;
+        t.resize(stood.len(), 0.0);
+        prim.resize(stood.len(), 0);
+        walk.walk(&mut Closest::new(t, prim));
+        for (&ray, (&t, &prim)) in stood.iter().zip(t.iter().zip(&*prim)) {
+            self.t[ray as usize] = t;
+            self.prim[ray as usize] = prim;
+        }
+    }
 }
 
 impl BeamQuery for Any<'_> {
@@ -108,6 +137,15 @@ impl BeamQuery for Any<'_> {
     fn answer(&mut self, rays: &[u32; RAYS], lanes: u32, _t: &[f32; RAYS], prim_id: &[u32; RAYS]) {
         for lane in (0..RAYS).filter(|lane| lanes >> lane & 1 == 1) {
             self.hit[rays[lane] as usize] = prim_id[lane] != NONE;
+        }
+    }
+
+    fn ask_moved(&mut self, stood: &[u32], answers: &mut Answers, walk: impl Walk) {
+        let hit = &mut answers.hit;
+        hit.resize(stood.len(), false);
+        walk.walk(&mut Any { hit });
+        for (&ray, &hit) in stood.iter().zip(&*hit) {
+            self.hit[ray as usize] = hit;
         }
     }
 }
@@ -121,6 +159,8 @@ pub struct BatchReport {
     pub wave_rays: u64,
     /// Of these, rays whose entries were searched for; see [`Start`](super::Start).
     pub entry_rays: u64,
+    /// Of these, rays that were sorted; see [`Sorting`](super::Sorting).
+    pub sorted_rays: u64,
     /// Beams tried.
     pub beams: u64,
     /// Beams that turned out too wide for the tree; their rays were tried again or left to the wave.
@@ -143,6 +183,7 @@ impl std::ops::Add for BatchReport {
             beam_rays: self.beam_rays + other.beam_rays,
             wave_rays: self.wave_rays + other.wave_rays,
             entry_rays: self.entry_rays + other.entry_rays,
+            sorted_rays: self.sorted_rays + other.sorted_rays,
             beams: self.beams + other.beams,
             given_up: self.given_up + other.given_up,
             steps: self.steps + other.steps,
