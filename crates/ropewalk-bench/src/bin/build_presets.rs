@@ -38,6 +38,9 @@ struct Arguments {
     /// Overrides the price of memory.
     #[arg(long)]
     size_cost: Option<f64>,
+    /// Overrides the largest price of memory to a ray that hits the node.
+    #[arg(long)]
+    max_size_price: Option<f64>,
     /// Overrides the duplication limit.
     #[arg(long)]
     max_duplication: Option<f64>,
@@ -88,6 +91,7 @@ fn entries(arguments: &Arguments) -> anyhow::Result<Vec<Entry>> {
             BuildSettings { threads: arguments.threads, ..BuildSettings::preset(preset) };
         settings.traversal_cost = arguments.traversal_cost.unwrap_or(settings.traversal_cost);
         settings.size_cost = arguments.size_cost.unwrap_or(settings.size_cost);
+        settings.max_size_price = arguments.max_size_price.unwrap_or(settings.max_size_price);
         settings.max_duplication = arguments.max_duplication.unwrap_or(settings.max_duplication);
         if preset == Preset::Balanced {
             settings.binned_from = arguments.binned_from.unwrap_or(settings.binned_from);
@@ -95,7 +99,7 @@ fn entries(arguments: &Arguments) -> anyhow::Result<Vec<Entry>> {
         Entry { name: preset.name(), settings, seconds: Vec::new(), last: None }
     };
     let entries: Vec<Entry> = Preset::ALL.into_iter().filter(wanted).map(entry).collect();
-    anyhow::ensure!(!entries.is_empty(), "the presets are fast, balanced and best");
+    anyhow::ensure!(!entries.is_empty(), "the presets are fast, balanced, best and compact");
     Ok(entries)
 }
 

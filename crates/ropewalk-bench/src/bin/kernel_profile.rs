@@ -1,12 +1,13 @@
 //! Nanoseconds and counted events per ray of the batch kernels, without peers.
 //!
-//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START]`, names separated by commas;
-//! START is `automatic`, `root` or `entry`.
+//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START] [PRESETS]`, names separated by commas;
+//! START is `automatic`, `root` or `entry`. Rounds of the presets are interleaved.
 
 use anyhow::Context;
+use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::kernel::{BatchCaster, Level, Start};
 use ropewalk_bench::answer::BenchHit;
-use ropewalk_bench::harness::{Clock, Engine};
+use ropewalk_bench::harness::{Clock, Engine, Spread};
 use ropewalk_bench::own::Wave;
 use ropewalk_bench::scene::Catalog;
 use ropewalk_bench::workload::{Generator, Kind, Question, Sizes};
@@ -29,12 +30,17 @@ fn main() -> anyhow::Result<()> {
         "entry" => Start::Entry,
         name => anyhow::bail!("no start {name}"),
     };
+    let presets = match list(5) {
+        names if names.is_empty() => vec![Preset::Balanced],
+        names => names.iter().map(|name| preset(name)).collect::<anyhow::Result<_>>()?,
+    };
     let catalog =
         Catalog { data: PathBuf::from("../shared/data"), generated: "target/bench-scenes".into() };
     println!(
-        "{:12} {:9} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
+        "{:12} {:9} {:8} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
         "scene",
         "workload",
+        "preset",
         "Mrays/s",
         "ns/ray",
         "skip",
@@ -48,53 +54,70 @@ fn main() -> anyhow::Result<()> {
     );
     for entry in Catalog::select(&list(0))? {
         let scene = catalog.load(&entry)?;
-        let engine = Wave::build(&scene.mesh, 1)?;
-        let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engine.closest(rays, out);
+        let build = |&preset: &Preset| {
+            let settings = BuildSettings { threads: 1, ..BuildSettings::preset(preset) };
+            Wave::with_settings(&scene.mesh, &settings)
+        };
+        let engines: Vec<Wave> = presets.iter().map(build).collect::<anyhow::Result<_>>()?;
+        let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engines[0].closest(rays, out);
         let sizes = Sizes { side: 512, chords: 16_384, walk: 1 << 18 };
         let generator = Generator::new(&scene, sizes, &trace);
         for name in list(1) {
             let kind = Kind::named(&name).with_context(|| format!("no workload {name}"))?;
             let rays = generator.workload(kind).rays;
-            let caster = engine.caster().with_level(level).context("level not available")?;
-            let caster = caster.with_start(start);
-            let ns = time(&caster, kind.question(), &rays, rounds);
-            let events = match kind.question() {
-                Question::Occluded => caster.occluded_events(&rays),
-                Question::AllHits => caster.all_hits_events(&rays),
-                _ => caster.closest_hit_events(&rays),
+            let caster = |engine| {
+                let caster = Wave::caster(engine).with_level(level).context("level not available");
+                caster.map(|c| c.with_start(start))
             };
-            let n = rays.len() as f64;
-            let per = |count: u64| count as f64 / n;
-            println!(
-                "{:12} {name:9} {:7.2} {ns:7.1} {:6.3} {:6.2} {:6.2} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
-                entry.name,
-                1e3 / ns,
-                per(events.skipped),
-                per(events.looked),
-                per(events.boxed),
-                per(events.steps),
-                per(events.leaves),
-                per(events.blocks),
-                per(events.clear),
-                per(events.open)
-            );
+            let casters: Vec<_> = engines.iter().map(caster).collect::<anyhow::Result<_>>()?;
+            let times = time(&casters, kind.question(), &rays, rounds);
+            for ((caster, ns), preset) in casters.iter().zip(times).zip(&presets) {
+                let events = match kind.question() {
+                    Question::Occluded => caster.occluded_events(&rays),
+                    Question::AllHits => caster.all_hits_events(&rays),
+                    _ => caster.closest_hit_events(&rays),
+                };
+                let n = rays.len() as f64;
+                let per = |count: u64| count as f64 / n;
+                println!(
+                    "{:12} {name:9} {:8} {:7.2} {ns:7.1} {:6.3} {:6.2} {:6.2} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
+                    entry.name,
+                    preset.name(),
+                    1e3 / ns,
+                    per(events.skipped),
+                    per(events.looked),
+                    per(events.boxed),
+                    per(events.steps),
+                    per(events.leaves),
+                    per(events.blocks),
+                    per(events.clear),
+                    per(events.open)
+                );
+            }
         }
     }
     Ok(())
 }
 
-/// Median nanoseconds of thread CPU time a ray.
+fn preset(name: &str) -> anyhow::Result<Preset> {
+    let found = Preset::ALL.into_iter().find(|p| p.name() == name);
+    found.with_context(|| format!("no preset {name}"))
+}
+
+/// Median nanoseconds of thread CPU time a ray, for each caster.
 fn time(
-    caster: &BatchCaster<'_>,
+    casters: &[BatchCaster<'_>],
     question: Question,
     rays: &[ropewalk::Ray],
     rounds: usize,
-) -> f64 {
+) -> Vec<f64> {
     let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
     let mut hit = vec![false; rays.len()];
-    let mut all: Vec<f64> = (0..rounds)
-        .map(|_| {
-            let clock = Clock::start();
+    let mut samples = vec![Vec::new(); casters.len()];
+    for round in 0..rounds {
+        for i in 0..casters.len() {
+            let at = (i + round) % casters.len();
+            let (caster, clock) = (&casters[at], Clock::start());
             match question {
                 Question::Occluded => {
                     caster.occluded_into(rays, &mut hit);
@@ -105,9 +128,8 @@ fn time(
                     caster.closest_hit_into(rays, &mut t, &mut prim);
                 }
             }
-            clock.elapsed().0 * 1e9 / rays.len() as f64
-        })
-        .collect();
-    all.sort_by(f64::total_cmp);
-    all[rounds / 2]
+            samples[at].push(clock.elapsed().0 * 1e9 / rays.len() as f64);
+        }
+    }
+    samples.iter().filter_map(|s| Spread::of(s)).map(|s| s.median).collect()
 }
