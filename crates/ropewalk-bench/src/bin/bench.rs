@@ -5,7 +5,7 @@ use clap::Parser;
 use ropewalk_bench::answer::BenchHit;
 use ropewalk_bench::harness::{
     Answers, Budget, Builder, Engine, Family, Oracle, Record, Row, Testimony, build_rates,
-    calibrate, chart, cpu_name, max_wrong_per_million, rates, summary, verify,
+    calibrate, chart, commit, cpu_name, max_wrong_per_million, rates, summary, today, verify,
 };
 use ropewalk_bench::own::{TaB, TaBBuilder, Wave, WaveBuilder};
 use ropewalk_bench::peer::{
@@ -410,32 +410,4 @@ fn report(record: &Record, count: usize) {
             row.error
         );
     }
-}
-
-/// The short hash of the checked-out commit, with `+` if the work tree differs from it.
-fn commit() -> String {
-    let git = |arguments: &[&str]| {
-        let output = std::process::Command::new("git").args(arguments).output().ok()?;
-        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
-    let Some(hash) = git(&["rev-parse", "--short", "HEAD"]) else { return "unknown".into() };
-    let clean = git(&["status", "--porcelain", "-uno"]).is_some_and(|s| s.is_empty());
-    format!("{hash}{}", if clean { "" } else { "+" })
-}
-
-/// Today's date (UTC), `YYYY-MM-DD`.
-fn today() -> String {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    let days = now.map_or(0, |d| d.as_secs() / 86_400) as i64;
-    // Hinnant's civil_from_days, for dates after 1970: years begin in March.
-    let z = days + 719_468;
-    let (era, day_of_era) = (z / 146_097, z % 146_097);
-    let year_of_era =
-        (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let shifted = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
-    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
-    let year = year_of_era + era * 400 + i64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02}")
 }

@@ -4,14 +4,13 @@
 use anyhow::Context;
 use clap::Parser;
 use ropewalk::Geometry;
-use ropewalk::Sides;
 use ropewalk::build::{BuildSettings, Preset, build};
 use ropewalk::cost::LeafCost;
-use ropewalk::primitive::Triangle;
 use ropewalk::tree::{BspTree, NodeKind};
 use ropewalk::wide::{Treelet, WideTree};
-use ropewalk_bench::harness::{Clock, Spread};
-use ropewalk_bench::scene::{Catalog, Mesh};
+use ropewalk_bench::harness::{Clock, Spread, peak_resident};
+use ropewalk_bench::own::geometry;
+use ropewalk_bench::scene::Catalog;
 use std::path::PathBuf;
 
 /// Prints one CSV row a scene and preset.
@@ -103,14 +102,6 @@ fn entries(arguments: &Arguments) -> anyhow::Result<Vec<Entry>> {
     Ok(entries)
 }
 
-fn geometry(mesh: &Mesh) -> anyhow::Result<Geometry> {
-    let mut geometry = Geometry::new();
-    for face in 0..mesh.faces.len() as u32 {
-        geometry.push(Triangle { vertices: mesh.triangle(face) }, Sides::Both)?;
-    }
-    Ok(geometry)
-}
-
 impl Entry {
     fn run(&mut self, geometry: &Geometry, threads: usize) -> anyhow::Result<()> {
         self.last = None;
@@ -146,7 +137,7 @@ impl Entry {
             treelet_bytes as f64 / wide.bytes() as f64,
             planes,
             predicted_cost(tree, &BuildSettings::preset(Preset::Best)),
-            peak_mib().unwrap_or(0),
+            peak_resident().unwrap_or(0) >> 20,
         );
         Ok(())
     }
@@ -164,11 +155,4 @@ fn predicted_cost(tree: &BspTree, settings: &BuildSettings) -> f64 {
             };
     });
     cost
-}
-
-/// Peak resident set of this process, where Linux tells it.
-fn peak_mib() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? / 1024)
 }

@@ -48,6 +48,11 @@ impl Wave {
         Ok(Wave { geometry, tree })
     }
 
+    /// Bytes of the tree, its own triangles included.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes()
+    }
+
     /// The caster on one thread.
     pub fn caster(&self) -> BatchCaster<'_> {
         BatchCaster::new(&self.tree, &self.geometry).with_threads(1)
@@ -116,6 +121,6 @@ impl Builder for WaveBuilder<'_> {
         let built = Wave::over(geometry, &settings(threads))?;
         let (cpu, wall_seconds) = clock.elapsed();
         let seconds = if threads == 1 { cpu } else { wall_seconds };
-        Ok(Built { seconds, wall_seconds, bytes: Some(built.tree.bytes()) })
+        Ok(Built { seconds, wall_seconds, bytes: Some(built.bytes()) })
     }
 }

@@ -103,10 +103,41 @@ impl Mesh {
         self.faces[face as usize].map(|v| self.vertices[v as usize])
     }
 
+    /// True if the surface has no rim: each edge has as many faces on its one side as on the other,
+    /// vertices at the same place counted as one.
+    pub fn is_closed(&self) -> bool {
+        let mut places: Vec<[u32; 3]> = self.vertices.iter().map(place).collect();
+        places.sort_unstable();
+        places.dedup();
+        let id = |v: u32| {
+            let place = place(&self.vertices[v as usize]);
+            places.partition_point(|p| *p < place) as u32
+        };
+        let mut edges = Vec::with_capacity(3 * self.faces.len());
+        for face in &self.faces {
+            let [a, b, c] = face.map(id);
+            edges.extend(
+                [(a, b), (b, c), (c, a)]
+                    .into_iter()
+                    .filter(|(from, to)| from != to)
+                    .map(|(from, to)| if from < to { (from, to, 1i8) } else { (to, from, -1) }),
+            );
+        }
+        edges.sort_unstable();
+        edges
+            .chunk_by(|x, y| (x.0, x.1) == (y.0, y.1))
+            .all(|uses| uses.iter().map(|e| i64::from(e.2)).sum::<i64>() == 0)
+    }
+
     /// The box of all vertices that a face uses.
     pub fn bounds(&self) -> Aabb {
         Aabb::from_points(self.faces.iter().flatten().map(|&v| self.vertices[v as usize]))
     }
+}
+
+/// A position as something that can be sorted; -0 is 0.
+fn place(vertex: &[f32; 3]) -> [u32; 3] {
+    vertex.map(|x| (x + 0.0).to_bits())
 }
 
 #[cfg(test)]
