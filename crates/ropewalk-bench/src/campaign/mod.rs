@@ -170,7 +170,7 @@ impl<'a> Campaign<'a> {
         if aim == Aim::Inside {
             tally.lost = tally.rays - tally.hits;
         }
-        let every = all_hits.then(|| self.walk.hits(&rays, usize::MAX));
+        let every = all_hits.then(|| self.every_hit(&rays));
         for level in Level::ALL {
             let Some(caster) = self.wave.caster().with_level(level) else { continue };
             let hits = caster.closest_hit(&rays);
@@ -186,12 +186,23 @@ impl<'a> Campaign<'a> {
                 let range = all.offsets[ray]..all.offsets[ray + 1];
                 let own = all.t[range.clone()].iter().zip(&all.prim_id[range]);
                 let own = own.map(|(&t, &prim)| (t.to_bits(), prim));
-                let theirs = lists.of(ray).iter().map(|h| ((h.t + 0.0).to_bits(), h.prim));
-                tally.all_hits += u64::from(!own.eq(theirs));
+                tally.all_hits += u64::from(!own.eq(lists[ray].iter().copied()));
             }
         }
         tally.all_hits_rays = every.map_or(0, |lists| lists.len() as u64);
         tally
+    }
+
+    /// All hits of each ray in the walk's arithmetic, `t` as bits; -0 is 0.
+    fn every_hit(&self, rays: &[Ray]) -> Vec<Vec<(u32, u32)>> {
+        let lists = self.walk.hits(rays, usize::MAX);
+        let row = |ray: usize| {
+            let mut hits = lists.of(ray).to_vec();
+            hits.iter_mut().for_each(|h| h.t += 0.0);
+            hits.sort_unstable_by(BenchHit::order);
+            hits.iter().map(|h| (h.t.to_bits(), h.prim)).collect()
+        };
+        (0..rays.len()).map(row).collect()
     }
 
     fn compare(&self, tally: &mut Tally, own: BenchHit, right: BenchHit) {
