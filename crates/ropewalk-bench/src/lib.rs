@@ -12,4 +12,5 @@ pub mod own;
 pub mod peer;
 pub mod scene;
 pub mod scenes;
-pub mod workload;
+
+pub use ropewalk_workload as workload;

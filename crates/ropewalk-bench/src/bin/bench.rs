@@ -148,7 +148,7 @@ fn pictures(
         let tree = Arc::new(EmbreeScene::build(&plan.device, &scene.mesh, quality)?);
         let engine = EmbreeEngine::new(&tree, Call::Single);
         let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engine.closest(rays, out);
-        let grey = Generator::new(&scene, plan.sizes, &trace).picture();
+        let grey = Generator::new(&scene.mesh, &scene.view, plan.sizes, &trace).picture();
         let mut file = format!("P5 {0} {0} 255\n", plan.sizes.side).into_bytes();
         file.extend(grey);
         std::fs::write(folder.join(format!("{}.pgm", entry.name)), file)?;
@@ -215,7 +215,7 @@ fn run_scene(plan: &Plan, scene: &Scene, record: &mut Record) -> anyhow::Result<
         let engines = engines(plan, mesh, filters)?;
         let tracer = &engines[0];
         let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| tracer.closest(rays, out);
-        let generator = Generator::new(scene, plan.sizes, &trace);
+        let generator = Generator::new(&scene.mesh, &scene.view, plan.sizes, &trace);
         for kind in traced {
             run_workload(plan, mesh, &generator.workload(kind), &engines, record)?;
         }

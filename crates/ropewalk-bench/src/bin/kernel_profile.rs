@@ -61,7 +61,7 @@ fn main() -> anyhow::Result<()> {
         let engines: Vec<Wave> = presets.iter().map(build).collect::<anyhow::Result<_>>()?;
         let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engines[0].closest(rays, out);
         let sizes = Sizes { side: 512, chords: 16_384, walk: 1 << 18 };
-        let generator = Generator::new(&scene, sizes, &trace);
+        let generator = Generator::new(&scene.mesh, &scene.view, sizes, &trace);
         for name in list(1) {
             let kind = Kind::named(&name).with_context(|| format!("no workload {name}"))?;
             let rays = generator.workload(kind).rays;

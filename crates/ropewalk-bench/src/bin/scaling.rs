@@ -184,7 +184,7 @@ fn point(arguments: &Arguments, name: &str, size: &str) -> anyhow::Result<()> {
 
     let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engine.closest(rays, out);
     let sizes = Sizes { side: SIDE, ..Sizes::QUICK };
-    let rays = Generator::new(&scene, sizes, &trace).workload(Kind::Diffuse).rays;
+    let rays = Generator::new(&scene.mesh, &scene.view, sizes, &trace).workload(Kind::Diffuse).rays;
     anyhow::ensure!(!rays.is_empty(), "the view sees nothing");
     let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
     let mut samples = Vec::new();

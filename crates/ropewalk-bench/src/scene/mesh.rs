@@ -1,8 +1,9 @@
 //! A triangle mesh with a view, and its reader for PLY and GLB files, gzipped or plain.
 
 use super::{glb, ply};
+use crate::workload::{Surface, View, triangle_normal};
 use flate2::read::GzDecoder;
-use ropewalk::Aabb;
+use ropewalk::{Aabb, Ray};
 use std::io::Read;
 use std::path::Path;
 
@@ -16,21 +17,6 @@ pub struct Mesh {
     pub vertices: Vec<[f32; 3]>,
     /// Three vertex indices a triangle.
     pub faces: Vec<[u32; 3]>,
-}
-
-/// From where a scene is seen, and where its light stands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// Eye point.
-    pub eye: [f32; 3],
-    /// Point looked at.
-    pub at: [f32; 3],
-    /// Up direction; any direction that is not parallel to the view.
-    pub up: [f32; 3],
-    /// Full view angle in degrees; the picture is square.
-    pub fov_degrees: f32,
-    /// Point light for shadow rays.
-    pub light: [f32; 3],
 }
 
 /// A mesh and its view.
@@ -132,6 +118,16 @@ impl Mesh {
     /// The box of all vertices that a face uses.
     pub fn bounds(&self) -> Aabb {
         Aabb::from_points(self.faces.iter().flatten().map(|&v| self.vertices[v as usize]))
+    }
+}
+
+impl Surface for Mesh {
+    fn bounds(&self) -> Aabb {
+        Mesh::bounds(self)
+    }
+
+    fn facing_normal(&self, prim: u32, ray: &Ray) -> Option<[f64; 3]> {
+        triangle_normal(self.triangle(prim), ray)
     }
 }
 
