@@ -33,6 +33,15 @@ struct Arguments {
     /// Rounds of each engine.
     #[arg(long)]
     rounds: Option<usize>,
+    /// Seconds of a round; an engine that needs longer gets a subset of the rays.
+    #[arg(long)]
+    seconds: Option<f64>,
+    /// The same for peers other than Embree.
+    #[arg(long)]
+    peer_seconds: Option<f64>,
+    /// Seconds of all builds of an engine on a scene; three are made in any case.
+    #[arg(long)]
+    build_seconds: Option<f64>,
     /// Fewer rays and rounds, for trying out; the record goes to target/bench-quick.
     #[arg(long)]
     quick: bool,
@@ -180,30 +189,22 @@ fn plan(arguments: &Arguments) -> anyhow::Result<Plan> {
         if arguments.quick { (Budget::QUICK, Sizes::QUICK) } else { (Budget::FULL, Sizes::FULL) };
     budget.rounds = arguments.rounds.unwrap_or(budget.rounds);
     anyhow::ensure!(budget.rounds > 0, "at least one round is needed");
+    for (own, given) in [
+        (&mut budget.seconds_per_round, arguments.seconds),
+        (&mut budget.peer_seconds, arguments.peer_seconds),
+        (&mut budget.build_seconds, arguments.build_seconds),
+    ] {
+        *own = given.unwrap_or(*own);
+        anyhow::ensure!(*own > 0.0, "seconds: expected a number above 0, found {own}");
+    }
     let library = match &arguments.embree {
         Some(path) => path.clone(),
-        None => find_embree(Path::new(".venv-bench"))
+        None => Embree::find(Path::new(".venv-bench"))
             .context("no libembree4 found below .venv-bench; scripts/bench installs it")?,
     };
     let device = Embree::load(&library, 1)?;
     let engines = arguments.engines.clone();
     Ok(Plan { kinds, engines, threads, budget, sizes, library, device })
-}
-
-/// The library inside the package that scripts/bench installs.
-fn find_embree(below: &Path) -> Option<PathBuf> {
-    for entry in std::fs::read_dir(below).ok()?.flatten() {
-        let (path, name) = (entry.path(), entry.file_name());
-        if name.to_string_lossy().starts_with("libembree4") {
-            return Some(path);
-        }
-        if entry.file_type().is_ok_and(|t| t.is_dir())
-            && let Some(found) = find_embree(&path)
-        {
-            return Some(found);
-        }
-    }
-    None
 }
 
 fn run_scene(plan: &Plan, scene: &Scene, record: &mut Record) -> anyhow::Result<()> {

@@ -1,6 +1,7 @@
 //! Cost per ray, build time and memory from 10^4 to 10^7 triangles:
 //! `cargo run --release -p ropewalk-bench --bin scaling`. Each point is measured in a process of its
-//! own, one thread, so that its peak of memory is its own.
+//! own, one thread, so that its peak of memory is its own. Where `scripts/bench` has installed Embree,
+//! its packets of 16 are asked the same rays in turn.
 
 use anyhow::Context;
 use clap::Parser;
@@ -11,11 +12,13 @@ use ropewalk_bench::harness::{
     resident, today,
 };
 use ropewalk_bench::own::{Wave, geometry};
+use ropewalk_bench::peer::{Call, Embree, EmbreeEngine, EmbreeScene, Quality};
 use ropewalk_bench::scene::{Mesh, Scene, View};
 use ropewalk_bench::scenes::{bumpy_sphere, soup_mesh, terrain_mesh};
 use ropewalk_bench::workload::{Generator, Kind, Sizes};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
+use std::sync::Arc;
 
 /// Measures diffuse rays of the default preset over families of scenes of growing size.
 #[derive(Parser)]
@@ -89,7 +92,8 @@ const FAMILIES: [Family; 3] = [
 ];
 
 const COLUMNS: &str = "family,triangles,ns_per_ray,ns_min,ns_max,steps_per_ray,leaves_per_ray,\
-    blocks_per_ray,build_seconds,result_bytes,build_peak_bytes,peak_over_result,bytes_per_triangle";
+    blocks_per_ray,build_seconds,result_bytes,build_peak_bytes,peak_over_result,bytes_per_triangle,\
+    embree_16_ns";
 const SIDE: usize = 512;
 
 fn main() -> ExitCode {
@@ -124,7 +128,7 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut csv = format!("{COLUMNS},preset,cpu,commit\n");
     let mut lines = Vec::new();
     for family in families {
-        let mut points = Vec::new();
+        let (mut points, mut theirs) = (Vec::new(), Vec::new());
         for size in &sizes {
             let child = Command::new(std::env::current_exe()?)
                 .args(["--rounds", &arguments.rounds.to_string(), "--preset", &arguments.preset])
@@ -140,12 +144,13 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 Ok(row.split(',').nth(column).context("a row is too short")?.parse()?)
             };
             points.push((number(1)?, number(2)?));
+            theirs.extend(number(13).ok().map(|ns| (points[points.len() - 1].0, ns)));
         }
-        lines.extend(with_logarithm(family, points));
+        lines.extend(family_curves(family, points, theirs));
     }
     let stem = format!("scaling-{}-{}", today(), commit.replace('+', "-dirty"));
     let chart = curves(
-        "Nanoseconds a diffuse ray, one thread; dashed: in proportion to log N",
+        "Nanoseconds a diffuse ray, one thread; dashed: Embree's packets of 16, and in proportion to log N",
         "triangles",
         "ns a ray",
         &lines,
@@ -156,13 +161,14 @@ fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The measured curve, and the logarithm through its first point.
-fn with_logarithm(family: &Family, points: Vec<(f64, f64)>) -> Vec<Curve> {
+/// The measured curve, and dashed Embree's and the logarithm through the first point.
+fn family_curves(family: &Family, points: Vec<(f64, f64)>, theirs: Vec<(f64, f64)>) -> Vec<Curve> {
     let Some(&(first, cost)) = points.first() else { return Vec::new() };
     let ideal = points.iter().map(|&(n, _)| (n, cost * n.ln() / first.ln())).collect();
     let curve = |name: String, dashed, points| Curve { name, color: family.color, dashed, points };
     vec![
         curve(family.name.to_owned(), false, points),
+        curve(format!("Embree ({})", family.name), true, theirs),
         curve(format!("log N ({})", family.name), true, ideal),
     ]
 }
@@ -186,19 +192,25 @@ fn point(arguments: &Arguments, name: &str, size: &str) -> anyhow::Result<()> {
     let sizes = Sizes { side: SIDE, ..Sizes::QUICK };
     let rays = Generator::new(&scene.mesh, &scene.view, sizes, &trace).workload(Kind::Diffuse).rays;
     anyhow::ensure!(!rays.is_empty(), "the view sees nothing");
-    let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
-    let mut samples = Vec::new();
+    let mut hits = vec![BenchHit::MISS; rays.len()];
+    let peer = embree(&scene.mesh)?;
+    let mut engines: Vec<&dyn Engine> = vec![&engine];
+    engines.extend(peer.as_ref().map(|e| e as &dyn Engine));
+    let mut samples = vec![Vec::new(); engines.len()];
     for _ in 0..arguments.rounds.max(1) {
-        let clock = Clock::start();
-        engine.caster().closest_hit_into(&rays, &mut t, &mut prim);
-        samples.push(clock.elapsed().0 * 1e9 / rays.len() as f64);
+        for (engine, samples) in engines.iter().zip(&mut samples) {
+            let clock = Clock::start();
+            engine.closest(&rays, &mut hits);
+            samples.push(clock.elapsed().0 * 1e9 / rays.len() as f64);
+        }
     }
-    let spread = Spread::of(&samples).context("no rounds")?;
+    let spread = Spread::of(&samples[0]).context("no rounds")?;
+    let theirs = samples.get(1).and_then(|s| Spread::of(s));
     let events = engine.caster().closest_hit_events(&rays);
     let (n, triangles) = (rays.len() as f64, scene.mesh.faces.len());
     let bytes = engine.bytes();
     println!(
-        "{name},{triangles},{:.1},{:.1},{:.1},{:.2},{:.2},{:.2},{build:.3},{bytes},{peak},{:.2},{:.1}",
+        "{name},{triangles},{:.1},{:.1},{:.1},{:.2},{:.2},{:.2},{build:.3},{bytes},{peak},{:.2},{:.1},{}",
         spread.median,
         spread.min,
         spread.max,
@@ -206,7 +218,16 @@ fn point(arguments: &Arguments, name: &str, size: &str) -> anyhow::Result<()> {
         events.leaves as f64 / n,
         events.blocks as f64 / n,
         peak as f64 / bytes as f64,
-        bytes as f64 / triangles as f64
+        bytes as f64 / triangles as f64,
+        theirs.map_or(String::new(), |s| format!("{:.1}", s.median))
     );
     Ok(())
+}
+
+/// Embree's packets over its high-quality build, if its library is there.
+fn embree(mesh: &Mesh) -> anyhow::Result<Option<EmbreeEngine>> {
+    let Some(library) = Embree::find(Path::new(".venv-bench")) else { return Ok(None) };
+    let quality = Quality { high: true, robust: false, filter: false };
+    let scene = EmbreeScene::build(&Embree::load(&library, 1)?, mesh, quality)?;
+    Ok(Some(EmbreeEngine::new(&Arc::new(scene), Call::Packet)))
 }

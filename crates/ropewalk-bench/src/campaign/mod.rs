@@ -182,11 +182,11 @@ impl<'a> Campaign<'a> {
             tally.occluded += flags.iter().zip(&expected).filter(|&x| wrong(x)).count() as u64;
             let Some(lists) = &every else { continue };
             let all = caster.all_hits(&rays);
-            for ray in 0..rays.len() {
-                let range = all.offsets[ray]..all.offsets[ray + 1];
+            for (right, range) in lists.iter().zip(all.offsets.windows(2)) {
+                let range = range[0]..range[1];
                 let own = all.t[range.clone()].iter().zip(&all.prim_id[range]);
                 let own = own.map(|(&t, &prim)| (t.to_bits(), prim));
-                tally.all_hits += u64::from(!own.eq(lists[ray].iter().copied()));
+                tally.all_hits += u64::from(!own.eq(right.iter().copied()));
             }
         }
         tally.all_hits_rays = every.map_or(0, |lists| lists.len() as u64);

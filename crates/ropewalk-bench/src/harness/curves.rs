@@ -19,7 +19,7 @@ const WIDTH: f64 = 760.0;
 const HEIGHT: f64 = 420.0;
 const LEFT: f64 = 60.0;
 const RIGHT: f64 = 190.0;
-const TOP: f64 = 36.0;
+const TOP: f64 = 52.0;
 const BOTTOM: f64 = 44.0;
 /// Grid lines across.
 const LEVELS: usize = 5;
@@ -32,7 +32,8 @@ pub fn curves(title: &str, x_label: &str, y_label: &str, curves: &[Curve]) -> St
     let points = || curves.iter().flat_map(|c| &c.points);
     let exponents = || points().map(|p| p.0.log10());
     let lo = exponents().fold(f64::INFINITY, f64::min).floor();
-    let hi = exponents().fold(f64::NEG_INFINITY, f64::max).ceil().max(lo + 1.0);
+    // A little beyond the last point, not a whole power of ten.
+    let hi = exponents().fold(f64::NEG_INFINITY, f64::max).max(lo + 1.0) + 0.05;
     let step = nice(points().map(|p| p.1).fold(0.0, f64::max) / LEVELS as f64);
     let x = |v: f64| LEFT + (WIDTH - LEFT - RIGHT) * (v.log10() - lo) / (hi - lo);
     let y = |v: f64| HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * v / (step * LEVELS as f64);
@@ -45,7 +46,7 @@ pub fn curves(title: &str, x_label: &str, y_label: &str, curves: &[Curve]) -> St
          <text x=\"8\" y=\"{:.1}\">{y_label}</text>\n",
         LEFT + (WIDTH - LEFT - RIGHT) / 2.0,
         HEIGHT - 8.0,
-        TOP - 4.0
+        TOP - 14.0
     );
     if lo.is_finite() && step > 0.0 {
         for level in 0..=LEVELS {
@@ -60,7 +61,7 @@ pub fn curves(title: &str, x_label: &str, y_label: &str, curves: &[Curve]) -> St
                 y(value) + 4.0
             );
         }
-        for exponent in lo as i32..=hi as i32 {
+        for exponent in lo as i32..=hi.floor() as i32 {
             let _ = writeln!(
                 svg,
                 "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">10<tspan dy=\"-5\" \

@@ -11,6 +11,7 @@ mod provenance;
 mod record;
 mod statistics;
 mod summary;
+mod tables;
 mod verify;
 
 pub use chart::chart;
@@ -24,4 +25,5 @@ pub use provenance::{commit, today};
 pub use record::{Record, Row};
 pub use statistics::{Spread, geometric_mean};
 pub use summary::summary;
+pub use tables::tables;
 pub use verify::{Testimony, Verdict, max_wrong_per_million, verify};
