@@ -128,7 +128,10 @@ fn by_threads(entries: &[Entry], one: usize, all: usize) -> String {
         let rate = |scene: &str, threads: usize, ours: bool| {
             let rows = entries.iter().filter(|e| {
                 let place = (e.scene.as_str(), e.workload.as_str(), e.threads);
-                let plain = e.engine.starts_with("embree") && !e.engine.ends_with("-robust");
+                // A medium-quality build is another product, as in the ratios.
+                let plain = e.engine.starts_with("embree")
+                    && !e.engine.starts_with("embree-medium")
+                    && !e.engine.ends_with("-robust");
                 let engine = if ours { OWN.contains(&e.engine.as_str()) } else { plain };
                 engine && place == (scene, workload, threads)
             });
