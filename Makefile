@@ -5,7 +5,7 @@ CARGO ?= cargo
 OUT ?= out
 FUZZ_SECONDS ?= 60
 
-.PHONY: help demo test check fmt clippy unit doc fuzz bench bench-build clean
+.PHONY: help demo test check fmt clippy unit doc inlined fuzz bench bench-build clean
 
 help: ## List the commands
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -24,7 +24,7 @@ demo: tools ## Render a scene to a picture and print what each idea of the 1997 
 	@./target/release/ropewalk paper --scenes gears --size standard --rays 20000 --no-sensitivity -o $(OUT)/paper.html
 	@echo "==> picture: $(OUT)/gears.png   report: $(OUT)/paper.html"
 
-test: tools fmt clippy unit doc fuzz ## Everything that CI runs: format, lints, tests, doc tests, docs, fuzz
+test: tools fmt clippy unit doc inlined fuzz ## Everything that CI runs: format, lints, tests, doc tests, docs, inlining, fuzz
 
 fmt: tools
 	@echo "==> format"
@@ -41,6 +41,10 @@ unit: tools
 doc: tools
 	@echo "==> docs"
 	@RUSTDOCFLAGS="-D warnings" $(CARGO) doc --workspace --no-deps --locked --quiet
+
+inlined: tools
+	@echo "==> vector instructions inlined"
+	@scripts/inlined
 
 fuzz: tools ## Fuzz the NFF reader for FUZZ_SECONDS (needs a nightly toolchain)
 	@scripts/fuzz $(FUZZ_SECONDS)

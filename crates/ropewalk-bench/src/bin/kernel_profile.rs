@@ -1,17 +1,21 @@
 //! Nanoseconds and counted events per ray of the batch kernels, without peers.
 //!
 //! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START] [PRESETS]`, names separated by commas;
-//! START is `automatic`, `root` or `entry`. Rounds of the presets are interleaved.
+//! START is `automatic`, `root` or `entry`, or `single` for one call a ray. Rounds of the presets are
+//! interleaved.
+//!
+//! With the environment variable `PLAIN_CLOCK` time is taken from the wall clock, as Valgrind needs it.
 
 use anyhow::Context;
 use ropewalk::build::{BuildSettings, Preset};
-use ropewalk::kernel::{BatchCaster, Level, Start};
+use ropewalk::kernel::{AllHits, BatchCaster, Level, Start};
 use ropewalk_bench::answer::BenchHit;
 use ropewalk_bench::harness::{Clock, Engine, Spread};
 use ropewalk_bench::own::Wave;
 use ropewalk_bench::scene::Catalog;
 use ropewalk_bench::workload::{Generator, Kind, Question, Sizes};
 use std::path::PathBuf;
+use std::time::Instant;
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -28,8 +32,10 @@ fn main() -> anyhow::Result<()> {
         "automatic" => Start::Automatic,
         "root" => Start::Root,
         "entry" => Start::Entry,
+        "single" => Start::Root,
         name => anyhow::bail!("no start {name}"),
     };
+    let single = arguments.get(4).is_some_and(|name| name == "single");
     let presets = match list(5) {
         names if names.is_empty() => vec![Preset::Balanced],
         names => names.iter().map(|name| preset(name)).collect::<anyhow::Result<_>>()?,
@@ -70,7 +76,7 @@ fn main() -> anyhow::Result<()> {
                 caster.map(|c| c.with_start(start))
             };
             let casters: Vec<_> = engines.iter().map(caster).collect::<anyhow::Result<_>>()?;
-            let times = time(&casters, kind.question(), &rays, rounds);
+            let times = time(&casters, kind.question(), &rays, rounds, single);
             for ((caster, ns), preset) in casters.iter().zip(times).zip(&presets) {
                 let events = match kind.question() {
                     Question::Occluded => caster.occluded_events(&rays),
@@ -104,31 +110,66 @@ fn preset(name: &str) -> anyhow::Result<Preset> {
     found.with_context(|| format!("no preset {name}"))
 }
 
+/// Thread CPU time, or wall time where the other cannot be had.
+enum Stopwatch {
+    Thread(Clock),
+    Wall(Instant),
+}
+
+impl Stopwatch {
+    fn start() -> Self {
+        if std::env::var_os("PLAIN_CLOCK").is_some() {
+            Stopwatch::Wall(Instant::now())
+        } else {
+            Stopwatch::Thread(Clock::start())
+        }
+    }
+
+    fn seconds(&self) -> f64 {
+        match self {
+            Stopwatch::Thread(clock) => clock.elapsed().0,
+            Stopwatch::Wall(start) => start.elapsed().as_secs_f64(),
+        }
+    }
+}
+
 /// Median nanoseconds of thread CPU time a ray, for each caster.
 fn time(
     casters: &[BatchCaster<'_>],
     question: Question,
     rays: &[ropewalk::Ray],
     rounds: usize,
+    single: bool,
 ) -> Vec<f64> {
     let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
     let mut hit = vec![false; rays.len()];
+    let mut all_hits = AllHits::default();
     let mut samples = vec![Vec::new(); casters.len()];
     for round in 0..rounds {
         for i in 0..casters.len() {
             let at = (i + round) % casters.len();
-            let (caster, clock) = (&casters[at], Clock::start());
+            let (caster, clock) = (&casters[at], Stopwatch::start());
             match question {
+                Question::Occluded if single => {
+                    for (ray, hit) in rays.iter().zip(&mut hit) {
+                        *hit = caster.occluded_one(ray);
+                    }
+                }
+                Question::Closest | Question::Walk if single => {
+                    for (ray, t) in rays.iter().zip(&mut t) {
+                        *t = caster.closest_hit_one(ray).map_or(f32::INFINITY, |hit| hit.t);
+                    }
+                }
                 Question::Occluded => {
                     caster.occluded_into(rays, &mut hit);
                 }
-                Question::AllHits => drop(caster.all_hits(rays)),
-                Question::FirstHits(k) => drop(caster.first_hits(rays, k)),
+                Question::AllHits => caster.all_hits_into(rays, &mut all_hits),
+                Question::FirstHits(k) => caster.first_hits_into(rays, k, &mut all_hits),
                 _ => {
                     caster.closest_hit_into(rays, &mut t, &mut prim);
                 }
             }
-            samples[at].push(clock.elapsed().0 * 1e9 / rays.len() as f64);
+            samples[at].push(clock.seconds() * 1e9 / rays.len() as f64);
         }
     }
     samples.iter().filter_map(|s| Spread::of(s)).map(|s| s.median).collect()

@@ -8,4 +8,4 @@ mod ta_b;
 mod wave;
 
 pub use ta_b::{TaB, TaBBuilder, geometry};
-pub use wave::{Wave, WaveBuilder};
+pub use wave::{Single, Wave, WaveBuilder};

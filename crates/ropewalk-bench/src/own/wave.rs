@@ -6,15 +6,17 @@ use crate::harness::{Builder, Built, Clock, Engine, Family};
 use crate::scene::Mesh;
 use crate::workload::Question;
 use ropewalk::build::{BuildSettings, Preset};
-use ropewalk::kernel::BatchCaster;
+use ropewalk::kernel::{AllHits, BatchCaster};
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray};
 use std::cell::RefCell;
+use std::sync::Arc;
 
 /// The wide tree, one batch call a workload, at the best SIMD level of the machine.
+#[derive(Clone)]
 pub struct Wave {
-    geometry: Geometry,
-    tree: WideTree,
+    geometry: Arc<Geometry>,
+    tree: Arc<WideTree>,
 }
 
 /// The default preset of the wide tree.
@@ -45,7 +47,7 @@ impl Wave {
     /// What the builder or the compiler says.
     pub fn over(geometry: Geometry, settings: &BuildSettings) -> anyhow::Result<Self> {
         let (tree, _) = WideTree::build(&geometry, settings, &())?;
-        Ok(Wave { geometry, tree })
+        Ok(Wave { geometry: Arc::new(geometry), tree: Arc::new(tree) })
     }
 
     /// Bytes of the tree, its own triangles included.
@@ -96,10 +98,51 @@ impl Engine for Wave {
     }
 
     fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
-        let all = self.caster().first_hits(rays, limit);
-        let hits = all.t.into_iter().zip(all.prim_id).map(|(t, prim)| BenchHit { t, prim });
-        let offsets = all.offsets.into_iter().map(|o| o as u32).collect();
-        HitLists { offsets, hits: hits.collect() }
+        thread_local! {
+            static ALL: RefCell<AllHits> = RefCell::default();
+        }
+        ALL.with_borrow_mut(|all| {
+            self.caster().first_hits_into(rays, limit, all);
+            let hits = all.t.iter().zip(&all.prim_id).map(|(&t, &prim)| BenchHit { t, prim });
+            let offsets = all.offsets.iter().map(|&o| o as u32).collect();
+            HitLists { offsets, hits: hits.collect() }
+        })
+    }
+}
+
+/// The same tree, one call a ray.
+pub struct Single(pub Wave);
+
+impl Engine for Single {
+    fn name(&self) -> String {
+        "ropewalk-single".into()
+    }
+
+    fn family(&self) -> Family {
+        Family::Own
+    }
+
+    fn level(&self) -> &str {
+        self.0.level()
+    }
+
+    fn supports(&self, question: Question) -> bool {
+        matches!(question, Question::Closest | Question::Occluded | Question::Walk)
+    }
+
+    fn closest(&self, rays: &[Ray], out: &mut [BenchHit]) {
+        let caster = self.0.caster();
+        for (ray, out) in rays.iter().zip(out) {
+            let hit = caster.closest_hit_one(ray);
+            *out = hit.map_or(BenchHit::MISS, |hit| BenchHit { t: hit.t, prim: hit.prim_id });
+        }
+    }
+
+    fn occluded(&self, rays: &[Ray], out: &mut [bool]) {
+        let caster = self.0.caster();
+        for (ray, out) in rays.iter().zip(out) {
+            *out = caster.occluded_one(ray);
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
+use super::beam::FourDoubles;
 use super::level::{Found, Nearest, Range, Root, Simd};
 use super::slot::{Loaded, Slot};
 use super::x86::{self, Children, Lanes};
@@ -37,6 +38,8 @@ pub static COMPRESS: CompressTable = {
 };
 
 impl Simd for Avx2 {
+    type Doubles = FourDoubles;
+
     #[inline(always)]
     unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loaded {
         // SAFETY: passed on to the caller.
@@ -50,7 +53,7 @@ impl Simd for Avx2 {
         // fit: STACK's doc).
         unsafe {
             let Children { code: children, enter, exit, widened } =
-                x86::children(slot, treelet, sp);
+                x86::children::<Avx2>(slot, treelet, sp);
             let empty = _mm256_cmpeq_epi32(children, _mm256_setzero_si256());
             let reached = _mm256_cmp_ps::<_CMP_LE_OQ>(enter, widened);
             let kept = _mm256_andnot_ps(_mm256_castsi256_ps(empty), reached);
@@ -108,8 +111,8 @@ impl Simd for Avx2 {
             let clear = _mm256_and_ps(reached, whole);
             let open =
                 _mm256_or_ps(_mm256_andnot_ps(inside, meets), _mm256_andnot_ps(clear, reached));
-            let mask = |v| _mm256_movemask_ps(v) as u32;
-            Found { clear: mask(clear), open: mask(open) }
+            let (clear, open) = (_mm256_movemask_ps(clear), _mm256_movemask_ps(open));
+            Found { clear: clear as u32, open: open as u32 }
         }
     }
 
@@ -144,6 +147,18 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn keep(lanes: u32, row: &[u32; WIDTH], kept: &mut [u32; WIDTH]) {
+        // SAFETY: the caller vouches for the features; the loads are of a whole row and one of the
+        // table's 256 entries, the store is as long as the row.
+        unsafe {
+            let order = _mm_loadl_epi64(COMPRESS.0.as_ptr().add(lanes as usize & 255).cast());
+            let row = _mm256_loadu_si256(row.as_ptr().cast());
+            let row = _mm256_permutevar8x32_epi32(row, _mm256_cvtepu8_epi32(order));
+            _mm256_storeu_si256(kept.as_mut_ptr().cast(), row);
+        }
+    }
+
+    #[inline(always)]
     unsafe fn prefetch(address: *const u8) {
         x86::prefetch(address);
     }
@@ -163,5 +178,20 @@ unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> __m256 {
             _mm256_cmp_ps::<_CMP_GE_OQ>(farthest, t_min),
         );
         _mm256_andnot_ps(outside, meets)
+    }
+}
+
+impl x86::Narrow for Avx2 {
+    #[inline(always)]
+    unsafe fn max<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
+        // SAFETY: the caller vouches for the features; max and min return their second operand where
+        // the first is NaN.
+        unsafe { _mm256_blend_ps::<LANES>(bound, _mm256_max_ps(t, bound)) }
+    }
+
+    #[inline(always)]
+    unsafe fn min<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
+        // SAFETY: as above.
+        unsafe { _mm256_blend_ps::<LANES>(bound, _mm256_min_ps(t, bound)) }
     }
 }

@@ -5,14 +5,17 @@
 use super::beam::{self, BatchReport, BeamQuery, beams};
 use super::entry::Path;
 use super::events::{BatchEvents, Events, NoEvents};
-use super::level::Level;
+use super::exact::Exact;
+use super::leaf::Leaves;
+use super::level::{Level, Root};
 use super::query::{Any, BatchQuery, Closest, Count, Every, Filtered, HitFilter, NoFilter};
 use super::scalar::Scalar;
+use super::single::{single, with_slot};
 use super::slot::Slot;
 use super::source::{FromEntry, FromRoot, Source};
 use super::wave::{WAVE, wave};
 use crate::geometry::Geometry;
-use crate::ray::Ray;
+use crate::ray::{Hit, PreparedRay, Ray};
 use crate::wide::WideTree;
 use rayon::prelude::*;
 
@@ -28,6 +31,9 @@ const MAX_SAMPLE: usize = 64;
 /// The share of rays that the entry search must answer to be worth its time: measured, it loses at
 /// .15 and .24 and wins at .47 and above.
 const WORTHWHILE: f64 = 0.4;
+
+/// Room for so many hits, eight bytes each, is kept by a thread between batches.
+const KEPT_HITS: usize = 1 << 22;
 
 /// The hits of a batch: one entry a ray.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -70,6 +76,7 @@ pub enum Start {
 pub struct BatchCaster<'a, F = NoFilter> {
     tree: &'a WideTree,
     geometry: &'a Geometry,
+    root: Root,
     level: Level,
     threads: usize,
     beams: bool,
@@ -83,6 +90,7 @@ impl<'a> BatchCaster<'a> {
         BatchCaster {
             tree,
             geometry,
+            root: Root::new(tree.bounds(), tree.root()),
             level: Level::best(),
             threads: 0,
             beams: true,
@@ -97,8 +105,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// batch and the hit, or [`Masks`](super::Masks) or [`Opacity`](super::Opacity) from arrays. It
     /// runs inside the traversal; see [`HitFilter`] for what it may rely on.
     pub fn with_filter<G: HitFilter>(self, filter: G) -> BatchCaster<'a, G> {
-        let BatchCaster { tree, geometry, level, threads, beams, start, .. } = self;
-        BatchCaster { tree, geometry, level, threads, beams, start, filter }
+        let BatchCaster { tree, geometry, root, level, threads, beams, start, .. } = self;
+        BatchCaster { tree, geometry, root, level, threads, beams, start, filter }
     }
 
     /// The same with another level, or `None` if this machine lacks it.
@@ -175,6 +183,32 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         chunks.map(run).reduce(BatchReport::default, |a, b| a + b)
     }
 
+    /// The first hit of one ray, `None` for a miss: for rays that depend on each other, at a fraction of
+    /// the cost of a batch of one. A filter sees ray 0. Rays that are there together are faster in a
+    /// batch.
+    pub fn closest_hit_one(&self, ray: &Ray) -> Option<Hit> {
+        let leaves = self.leaves(ray);
+        with_slot(|slot| {
+            let query = Closest::new(&mut [], &mut []);
+            if !self.run_one(&leaves, slot, query) || slot.best_id == u32::MAX {
+                return None;
+            }
+            if slot.best_at != u32::MAX {
+                return leaves.exact.hit(0, slot.best_at);
+            }
+            // Only its parameter is known.
+            self.geometry.intersect(slot.best_id, &PreparedRay::new(ray)?)
+        })
+    }
+
+    /// Whether one ray hits anything; see [`BatchCaster::closest_hit_one`].
+    pub fn occluded_one(&self, ray: &Ray) -> bool {
+        let leaves = self.leaves(ray);
+        with_slot(|slot| {
+            self.run_one(&leaves, slot, Any { hit: &mut [] }) && slot.best_id != u32::MAX
+        })
+    }
+
     /// The number of primitives that each ray hits.
     pub fn count_hits(&self, rays: &[Ray]) -> Vec<u32> {
         let mut counts = vec![0; rays.len()];
@@ -194,36 +228,63 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         self.first_hits(rays, usize::MAX)
     }
 
+    /// The same, written over what `all` holds: its memory is used again.
+    pub fn all_hits_into(&self, rays: &[Ray], all: &mut AllHits) {
+        self.first_hits_into(rays, usize::MAX, all);
+    }
+
     /// The first `k` hits of each ray, in order, each once.
     pub fn first_hits(&self, rays: &[Ray], k: usize) -> AllHits {
+        let mut all = AllHits::default();
+        self.first_hits_into(rays, k, &mut all);
+        all
+    }
+
+    /// The same, written over what `all` holds: its memory is used again.
+    pub fn first_hits_into(&self, rays: &[Ray], k: usize, all: &mut AllHits) {
+        all.offsets.clear();
+        all.offsets.resize(rays.len() + 1, 0);
+        all.t.clear();
+        all.prim_id.clear();
         if k == 0 {
-            return AllHits { offsets: vec![0; rays.len() + 1], ..AllHits::default() };
+            return;
         }
         let gather = |(i, rays): (usize, &[Ray])| {
-            self.run(rays, i * TASK, Every::new(k, rays.len(), WAVE), |every| every)
+            let mut every = with_room(|room| std::mem::take(&mut room.every));
+            every.start(k, rays.len(), WAVE);
+            self.run(rays, i * TASK, every, |every| every)
         };
         let parts: Vec<Every> = if self.is_serial(rays) {
             vec![gather((0, rays))]
         } else {
             rays.par_chunks(TASK).enumerate().map(gather).collect()
         };
-        let total = parts.iter().map(|p| p.done.len()).sum();
-        let mut all = AllHits {
-            offsets: Vec::with_capacity(rays.len() + 1),
-            t: Vec::with_capacity(total),
-            prim_id: Vec::with_capacity(total),
-        };
-        all.offsets.push(0);
-        for part in parts {
-            for (start, count) in part.range {
-                for &(t, prim) in &part.done[start..][..count as usize] {
-                    all.t.push(t);
-                    all.prim_id.push(prim);
-                }
-                all.offsets.push(all.t.len());
+        let total = parts.iter().map(|part| part.len()).sum();
+        all.t.resize(total, 0.0);
+        all.prim_id.resize(total, 0);
+        let (mut offset, mut ends) = (0, &mut all.offsets[1..]);
+        let (mut t, mut prim) = (&mut all.t[..], &mut all.prim_id[..]);
+        let rows = parts.into_iter().map(|part| {
+            let start = offset;
+            offset += part.len();
+            let rows = (
+                split(&mut ends, part.rays()),
+                split(&mut t, part.len()),
+                split(&mut prim, part.len()),
+            );
+            (part, start, rows)
+        });
+        let copy = |(part, offset, (ends, t, prim)): (Every, usize, Rows<'_>)| {
+            part.copy(offset, ends, t, prim);
+            if part.room() <= KEPT_HITS {
+                with_room(|room| room.every = part);
             }
+        };
+        if self.is_serial(rays) {
+            rows.for_each(copy);
+        } else {
+            rows.collect::<Vec<_>>().into_par_iter().for_each(copy);
         }
-        all
     }
 
     /// What the batch of [`BatchCaster::closest_hit`] does, counted, on one thread.
@@ -244,8 +305,26 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// What the batch of [`BatchCaster::all_hits`] does, counted, on one thread.
     pub fn all_hits_events(&self, rays: &[Ray]) -> BatchEvents {
         let mut events = BatchEvents::default();
-        self.run_counted(rays, &mut Every::new(usize::MAX, rays.len(), WAVE), &mut events);
+        let mut every = Every::default();
+        every.start(usize::MAX, rays.len(), WAVE);
+        self.run_counted(rays, &mut every, &mut events);
         events
+    }
+
+    /// What the batch of [`BatchCaster::closest_hit_one`] does, counted.
+    pub fn closest_hit_one_events(&self, ray: &Ray) -> BatchEvents {
+        let (leaves, mut events) = (self.leaves(ray), BatchEvents::default());
+        let query = Closest::new(&mut [], &mut []);
+        with_slot(|slot| self.run_one_counted(&leaves, slot, query, &mut events));
+        events
+    }
+
+    fn leaves<'r>(&self, ray: &'r Ray) -> Leaves<'r>
+    where
+        'a: 'r,
+    {
+        let exact = Exact { lines: self.tree.lines(), rays: std::slice::from_ref(ray) };
+        Leaves { tree: self.tree, geometry: self.geometry, exact }
     }
 
     fn is_serial(&self, rays: &[Ray]) -> bool {
@@ -299,6 +378,55 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         let mut filtered = Filtered { query, filter: &self.filter, first_ray };
         self.run_counted(rays, &mut filtered, &mut NoEvents);
         answer(filtered.query)
+    }
+
+    /// Puts one ray to `query`; see [`single`].
+    fn run_one<Q: BatchQuery>(&self, leaves: &Leaves<'_>, slot: &mut Slot, query: Q) -> bool {
+        self.run_one_counted(leaves, slot, query, &mut NoEvents)
+    }
+
+    fn run_one_counted<Q: BatchQuery, E: Events>(
+        &self,
+        leaves: &Leaves<'_>,
+        slot: &mut Slot,
+        query: Q,
+        events: &mut E,
+    ) -> bool {
+        let query = &mut Filtered { query, filter: &self.filter, first_ray: 0 };
+        if self.tree.has_shapes() {
+            self.one::<_, E, true>(leaves, slot, query, events)
+        } else {
+            self.one::<_, E, false>(leaves, slot, query, events)
+        }
+    }
+
+    /// One ray at the level in use.
+    fn one<Q: BatchQuery, E: Events, const SHAPES: bool>(
+        &self,
+        leaves: &Leaves<'_>,
+        slot: &mut Slot,
+        query: &mut Q,
+        events: &mut E,
+    ) -> bool {
+        let root = &self.root;
+        match self.level {
+            // SAFETY: portable code.
+            Level::Scalar => unsafe {
+                single::<Scalar, Q, E, SHAPES>(leaves, root, slot, query, events)
+            },
+            // SAFETY: `with_level` and `Level::best` give only levels this machine has.
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx2 => unsafe {
+                single_avx2::<Q, E, SHAPES>(leaves, root, slot, query, events)
+            },
+            // SAFETY: as above.
+            #[cfg(target_arch = "x86_64")]
+            Level::Avx512 => unsafe {
+                single_avx512::<Q, E, SHAPES>(leaves, root, slot, query, events)
+            },
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => unreachable!("only available levels can be chosen"),
+        }
     }
 
     fn run_counted<Q: BatchQuery, E: Events>(&self, rays: &[Ray], query: &mut Q, events: &mut E) {
@@ -397,11 +525,20 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     }
 }
 
+/// Ends, parameters and primitives of the rows of some rays.
+type Rows<'a> = (&'a mut [usize], &'a mut [f32], &'a mut [u32]);
+
+/// Splits `n` entries off the front.
+fn split<'a, T>(row: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+    row.split_off_mut(..n).expect("rows are as long as their parts together")
+}
+
 /// What a thread keeps between batches.
 struct Room {
     slots: Vec<Slot>,
     beam: Box<beam::Room>,
     order: Vec<u32>,
+    every: Every,
 }
 
 fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
@@ -413,12 +550,13 @@ fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
             slots: (0..WAVE).map(|_| Slot::new()).collect(),
             beam: Box::new(beam::Room::new()),
             order: Vec::new(),
+            every: Every::default(),
         }))
     })
 }
 
 macro_rules! instantiate {
-    ($wave:ident, $beams:ident, $level:ty, $features:literal) => {
+    ($wave:ident, $beams:ident, $single:ident, $level:ty, $features:literal) => {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
         fn $wave<Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
@@ -448,12 +586,32 @@ macro_rules! instantiate {
             // SAFETY: this function enables the level's features.
             unsafe { beams::<$level, Q>(tree, rays, query, room, left) }
         }
+
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = $features)]
+        fn $single<Q: BatchQuery, E: Events, const SHAPES: bool>(
+            leaves: &Leaves<'_>,
+            root: &Root,
+            slot: &mut Slot,
+            query: &mut Q,
+            events: &mut E,
+        ) -> bool {
+            // SAFETY: this function enables the level's features; the caller's root is the tree's.
+            unsafe { single::<$level, Q, E, SHAPES>(leaves, root, slot, query, events) }
+        }
     };
 }
-instantiate!(wave_avx2, beams_avx2, super::avx2::Avx2, "avx2,fma,bmi1,bmi2,popcnt,lzcnt");
+instantiate!(
+    wave_avx2,
+    beams_avx2,
+    single_avx2,
+    super::avx2::Avx2,
+    "avx2,fma,bmi1,bmi2,popcnt,lzcnt"
+);
 instantiate!(
     wave_avx512,
     beams_avx512,
+    single_avx512,
     super::avx512::Avx512,
     "avx2,fma,bmi1,bmi2,popcnt,lzcnt,avx512f,avx512vl,avx512bw,avx512dq"
 );

@@ -8,7 +8,7 @@ use super::avx512::Avx512;
 use super::entry::{Corners, Locate, REACH, Segment, path};
 use super::x86::SIGN;
 use crate::ray::Ray;
-use crate::wide::{Block, Treelet};
+use crate::wide::{AXIS_SHIFTS, Block, Treelet};
 use std::arch::x86_64::*;
 
 /// [`Locate::segment`].
@@ -55,7 +55,7 @@ unsafe fn lies_in(segment: &Segment, cell: &Corners) -> bool {
 unsafe fn axes(treelet: &Treelet) -> __m256i {
     // SAFETY: passed on to the caller; treelets are aligned.
     unsafe {
-        let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        let shifts = _mm256_loadu_si256(AXIS_SHIFTS.as_ptr().cast());
         _mm256_srlv_epi32(_mm256_set1_epi32(treelet.axes as i32), shifts)
     }
 }
@@ -115,19 +115,27 @@ unsafe fn child_of_end(segment: &Segment, treelet: &Treelet) -> usize {
 unsafe fn overlaps(segment: &Segment, block: &Block) -> bool {
     // SAFETY: the caller vouches for the features; all loads are of whole aligned rows.
     unsafe {
-        let axis = |a: usize| {
-            let row = |i: usize| _mm256_load_ps(block.vertex[i][a].as_ptr());
-            let (p, q, r) = (row(0), row(1), row(2));
-            let low = _mm256_min_ps(_mm256_min_ps(p, q), r);
-            let high = _mm256_max_ps(_mm256_max_ps(p, q), r);
-            let begins = _mm256_set1_ps(segment.corners.0[a]);
-            let ends = _mm256_set1_ps(-segment.corners.0[a + 4]);
-            _mm256_and_ps(
-                _mm256_cmp_ps::<_CMP_LE_OQ>(low, ends),
-                _mm256_cmp_ps::<_CMP_GE_OQ>(high, begins),
-            )
-        };
-        _mm256_movemask_ps(_mm256_and_ps(_mm256_and_ps(axis(0), axis(1)), axis(2))) != 0
+        let across = _mm256_and_ps(meets_on(segment, block, 0), meets_on(segment, block, 1));
+        _mm256_movemask_ps(_mm256_and_ps(across, meets_on(segment, block, 2))) != 0
+    }
+}
+
+/// The triangles whose boxes a segment's box meets on an axis, as a vector mask.
+#[inline(always)]
+unsafe fn meets_on(segment: &Segment, block: &Block, axis: usize) -> __m256 {
+    // SAFETY: passed on to the caller; the loads are of whole aligned rows.
+    unsafe {
+        let p = _mm256_load_ps(block.vertex[0][axis].as_ptr());
+        let q = _mm256_load_ps(block.vertex[1][axis].as_ptr());
+        let r = _mm256_load_ps(block.vertex[2][axis].as_ptr());
+        let low = _mm256_min_ps(_mm256_min_ps(p, q), r);
+        let high = _mm256_max_ps(_mm256_max_ps(p, q), r);
+        let begins = _mm256_set1_ps(segment.corners.0[axis]);
+        let ends = _mm256_set1_ps(-segment.corners.0[axis + 4]);
+        _mm256_and_ps(
+            _mm256_cmp_ps::<_CMP_LE_OQ>(low, ends),
+            _mm256_cmp_ps::<_CMP_GE_OQ>(high, begins),
+        )
     }
 }
 
@@ -145,7 +153,7 @@ unsafe fn narrow(cell: &Corners, treelet: &Treelet, child: usize) -> Corners {
         for (level, h) in path(child).into_iter().enumerate() {
             let lower = !(child >> (2 - level)) as u32 & 1;
             let plane = treelet.plane.get_unchecked(h).to_bits() ^ lower << 31;
-            let lane = treelet.axes >> (4 * h) & 3 | lower << 2;
+            let lane = treelet.axis(h) as u32 | lower << 2;
             let here = _mm256_cmpeq_epi32(lanes, _mm256_set1_epi32(lane as i32));
             let plane = _mm256_castsi256_ps(_mm256_set1_epi32(plane as i32));
             let tighter = _mm256_max_ps(corners, plane);

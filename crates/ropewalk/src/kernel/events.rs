@@ -3,9 +3,9 @@
 /// What a kernel does, counted or not. The kernels are generic over this, so that a run without
 /// counters pays nothing.
 pub trait Events {
-    /// A ray is under way.
+    /// Rays are under way.
     #[inline(always)]
-    fn ray(&mut self) {}
+    fn rays(&mut self, _n: usize) {}
     /// A ray is known to hit nothing where it is: no steps, no tests.
     #[inline(always)]
     fn skipped(&mut self) {}
@@ -24,7 +24,7 @@ pub trait Events {
     /// A block is looked at.
     #[inline(always)]
     fn block(&mut self) {}
-    /// A block that the ray meets is tested in full: lanes hit for sure, and open ones.
+    /// A block is tested in full: lanes hit for sure, and open ones.
     #[inline(always)]
     fn found(&mut self, _clear: u32, _open: u32) {}
 }
@@ -52,7 +52,7 @@ pub struct BatchEvents {
     pub leaves: u64,
     /// Blocks of eight primitives tested.
     pub blocks: u64,
-    /// Of these, blocks with a triangle that the ray may hit.
+    /// Of these, blocks tested in full: with a triangle that the ray may hit, or all of them.
     pub met: u64,
     /// Triangles hit for sure, as `f32` sees it.
     pub clear: u64,
@@ -61,8 +61,8 @@ pub struct BatchEvents {
 }
 
 impl Events for BatchEvents {
-    fn ray(&mut self) {
-        self.rays += 1;
+    fn rays(&mut self, n: usize) {
+        self.rays += n as u64;
     }
     fn skipped(&mut self) {
         self.skipped += 1;

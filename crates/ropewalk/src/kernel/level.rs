@@ -2,8 +2,12 @@
 
 #![allow(unsafe_code)]
 
+use super::beam::Doubles;
 use super::entry::Locate;
 use super::list::{List, Lists};
+use super::order::order;
+#[cfg(doc)]
+use super::order::room;
 use super::slot::{LARGE, Loaded, Slot};
 use crate::aabb::Aabb;
 use crate::ray::Ray;
@@ -15,9 +19,9 @@ use crate::wide::{Block, Treelet, WIDTH};
 pub enum Level {
     /// Portable code, the definition of the others.
     Scalar,
-    /// x86-64 with AVX2 and FMA.
+    /// x86-64 with AVX2, FMA and the bit instructions that came with them.
     Avx2,
-    /// x86-64 with AVX-512 F, VL, BW, DQ.
+    /// The same with AVX-512 F, VL, BW, DQ.
     Avx512,
 }
 
@@ -30,7 +34,14 @@ impl Level {
         match self {
             Level::Scalar => true,
             #[cfg(target_arch = "x86_64")]
-            Level::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            Level::Avx2 => {
+                is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                    && is_x86_feature_detected!("bmi1")
+                    && is_x86_feature_detected!("bmi2")
+                    && is_x86_feature_detected!("popcnt")
+                    && is_x86_feature_detected!("lzcnt")
+            }
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => {
                 Level::Avx2.is_available()
@@ -142,6 +153,9 @@ pub const WEIGHT_SLACK: f32 = 4.0;
 /// # Safety
 /// The methods may only run on a machine with the level's features.
 pub trait Simd: Locate {
+    /// Some lanes in `f64`, or one.
+    type Doubles: Doubles;
+
     /// [`Slot::load`], which it may call.
     ///
     /// # Safety
@@ -191,6 +205,26 @@ pub trait Simd: Locate {
     /// # Safety
     /// See the trait.
     unsafe fn others(block: &Block, prim_id: u32) -> u32;
+
+    /// Writes some lanes of a row one after another to the beginning of `kept`, and anything behind
+    /// them.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn keep(lanes: u32, row: &[u32; WIDTH], kept: &mut [u32; WIDTH]);
+
+    /// Sorts the keys of hits and writes parameters and primitives to the beginning of `t` and
+    /// `prim`, repeated ones once; returns how many these are. The order of `keys` is lost.
+    ///
+    /// # Panics
+    /// If `t` or `prim` is shorter than [`room`]`(keys.len())`: anything may be written there.
+    ///
+    /// # Safety
+    /// See the trait.
+    #[inline(always)]
+    unsafe fn order(keys: &mut [u64], t: &mut [f32], prim: &mut [u32]) -> usize {
+        order(keys, t, prim)
+    }
 
     /// Asks for a cache line.
     ///

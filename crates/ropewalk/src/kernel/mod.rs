@@ -3,6 +3,8 @@
 //! A batch keeps many rays in flight on each core: while one ray waits for a cache line, others
 //! step. The loop is written once (wave.rs) and is generic over the SIMD [`Level`] and the query.
 //!
+//! A ray by itself goes through the same steps and tests without lists (single.rs).
+//!
 //! Rays in turn that start or end in one point, or are parallel, and lie close together are taken out of
 //! the batch first and answered in beams (beam/), at a fraction of the cost; which way the rays went is
 //! reported, and answers do not depend on it.
@@ -16,10 +18,13 @@ mod entry_x86;
 mod events;
 mod exact;
 mod extreme;
+mod leaf;
 mod level;
 mod list;
+mod order;
 mod query;
 mod scalar;
+mod single;
 mod slot;
 mod source;
 mod wave;

@@ -13,6 +13,8 @@ use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
 pub struct Scalar;
 
 impl Simd for Scalar {
+    type Doubles = f64;
+
     #[inline(always)]
     unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, scene: &Root) -> Loaded {
         slot.load(ray, index, &scene.bounds, scene.code)
@@ -122,6 +124,15 @@ impl Simd for Scalar {
     unsafe fn others(block: &Block, prim_id: u32) -> u32 {
         let differs = |lane: usize| block.id[lane] & ID_MASK != prim_id;
         (0..WIDTH).map(|lane| u32::from(differs(lane)) << lane).sum()
+    }
+
+    #[inline(always)]
+    unsafe fn keep(lanes: u32, row: &[u32; WIDTH], kept: &mut [u32; WIDTH]) {
+        let mut n = 0;
+        for (lane, &x) in row.iter().enumerate() {
+            kept[n & (WIDTH - 1)] = x;
+            n += (lanes >> lane & 1) as usize;
+        }
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use crate::aabb::Aabb;
 use crate::ray::Ray;
-use crate::wide::{LEAF, MAX_WIDE_DEPTH};
+use crate::wide::{Flips, LEAF, MAX_WIDE_DEPTH};
 
 /// Entries of a slot's stack: each treelet on a path replaces one entry by at most eight, and a
 /// store writes eight lanes whatever their number. Slot 0 is the sentinel.
@@ -94,6 +94,8 @@ pub struct Slot {
     /// has `t = 0`, but `f64` may find it on either side of that, off by at most 2^-41 of the largest
     /// coordinate over the largest direction component; 2^-36 is kept.
     pub near_zero: f32,
+    /// Signs of the direction.
+    pub flips: Flips,
     /// Index of the top of the stack.
     pub sp: u32,
     /// True if a direction component is zero.
@@ -104,14 +106,14 @@ pub struct Slot {
     pub enter: [f32; STACK],
     /// Where it leaves them.
     pub exit: [f32; STACK],
-    _pad: [u32; 13],
+    _pad: [u32; 11],
 }
 
 const _: () = assert!(size_of::<Slot>() / 64 % 2 == 1);
 
 impl Slot {
     /// A slot without a ray.
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Slot {
             origin: [0.0; 4],
             inv: [0.0; 4],
@@ -127,12 +129,13 @@ impl Slot {
             best_at: 0,
             half_scale: 0.0,
             near_zero: 0.0,
+            flips: Flips::new(0),
             sp: 0,
             may_lie_in_plane: false,
             code: [0; STACK],
             enter: [0.0; STACK],
             exit: [0.0; STACK],
-            _pad: [0; 13],
+            _pad: [0; 11],
         }
     }
 
@@ -186,9 +189,30 @@ impl Slot {
         self.shear = [ray.dir[kx] * inv_z, ray.dir[ky] * inv_z, inv_z];
         self.edge_slack = EDGE_SLACK * size[kz];
         self.half_scale = 0.5 * inv_z.abs();
+        let sign = |a: usize| u32::from(self.inv[a].is_sign_negative()) << a;
+        self.flips = Flips::new(sign(0) | sign(1) | sign(2));
         self.start(ray, index);
         self.push_root(root, enter, exit);
         Loaded::Ready
+    }
+
+    /// Takes the cell just visited off the stack; true if nothing is left that matters, `any` hit
+    /// being enough or not.
+    ///
+    /// Cells are popped in the order in which the ray enters them, so one that starts behind the
+    /// limit ends the ray; except that a ray in a cutting plane is in the cells on both sides at
+    /// once, and then only each cell by itself can be dropped.
+    #[inline(always)]
+    pub fn pop(&mut self, any: bool) -> bool {
+        let mut below = (self.sp as usize).saturating_sub(1).min(STACK - 1);
+        if self.may_lie_in_plane {
+            while below > 0 && earlier(self.enter[below]) - self.near_zero > self.limit {
+                below -= 1;
+            }
+        }
+        self.sp = below as u32;
+        let behind = earlier(self.enter[below]) - self.near_zero > self.limit;
+        (below == 0) | behind | (any & (self.best_id != u32::MAX))
     }
 
     /// Empties the stack but for the root.

@@ -17,19 +17,24 @@
 #![allow(unsafe_code)]
 
 use super::events::Events;
-use super::exact::{Exact, place};
+use super::exact::Exact;
 use super::extreme;
-use super::level::{Found, Range, Root, Simd};
+use super::leaf::Leaves;
+use super::level::{Root, Simd};
 use super::list::{List, Lists};
-use super::query::{BatchQuery, Clear};
-use super::slot::{Loaded, STACK, Slot, earlier};
+use super::query::BatchQuery;
+use super::slot::{Loaded, Slot};
 use super::source::Source;
 use crate::geometry::Geometry;
-use crate::ray::{PreparedRay, Ray};
-use crate::wide::{BLOCK_LINES, Block, ID_MASK, LINE, WIDTH, WideTree, code_line, code_offset};
+use crate::ray::Ray;
+use crate::wide::{BLOCK_LINES, LINE, WIDTH, WideTree, code_line, code_offset};
 
 /// Rays in flight on a core.
 pub const WAVE: usize = 24;
+
+/// The share of blocks that must be hit for a test in full at once to be worth its time: measured,
+/// it wins at .4 and above and loses at .3.
+const WORTHWHILE: f64 = 0.375;
 
 /// Blocks to be tested, each with a number: how many of its leaf are left, or which lanes.
 struct Tests {
@@ -68,6 +73,10 @@ struct Wave<'a, Q, S, E> {
     /// True once the source has no more rays.
     exhausted: bool,
     lists: Lists,
+    /// Blocks looked at.
+    tested: u64,
+    /// Those of them with a triangle that is hit or may be.
+    struck: u64,
     /// Rays with the cells that they go to, before they are put on the lists.
     moved: List,
 }
@@ -111,6 +120,8 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source, E: Events, const SHAPES: b
         events,
         exhausted: false,
         lists,
+        tested: 0,
+        struck: 0,
         moved: List::EMPTY,
     };
     loop {
@@ -118,7 +129,8 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source, E: Events, const SHAPES: b
         unsafe { wave.refill::<L>() };
         while wave.lists.free.len == 0 || wave.exhausted {
             if wave.lists.stepping.len + wave.lists.waiting.len == 0 {
-                wave.query.end(&exact);
+                // SAFETY: passed on to the caller.
+                unsafe { wave.query.settle::<L>(&exact, true) };
                 return;
             }
             // SAFETY: passed on to the caller.
@@ -194,7 +206,7 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             // SAFETY: lists hold numbers of slots; the stack pointer stays on the stack.
             unsafe {
                 let slot = &mut *self.slots.as_mut_ptr().add(k as usize);
-                let ended = Self::pop(slot);
+                let ended = slot.pop(Q::ANY);
                 let code = *slot.code.get_unchecked(slot.sp as usize);
                 self.moved.set(i, k, std::hint::select_unpredictable(ended, 0, code));
             }
@@ -206,34 +218,22 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             let (k, _) = self.lists.free.get(i);
             self.query.finish(k as usize, &mut self.slots[k as usize], &self.exact);
         }
-    }
-
-    /// Takes the cell just visited off the stack; true if nothing is left that matters.
-    ///
-    /// Cells are popped in the order in which the ray enters them, so one that starts behind the
-    /// limit ends the ray; except that a ray in a cutting plane is in the cells on both sides at
-    /// once, and then only each cell by itself can be dropped.
-    #[inline(always)]
-    fn pop(slot: &mut Slot) -> bool {
-        let mut below = (slot.sp as usize).saturating_sub(1).min(STACK - 1);
-        if slot.may_lie_in_plane {
-            while below > 0 && earlier(slot.enter[below]) - slot.near_zero > slot.limit {
-                below -= 1;
-            }
-        }
-        slot.sp = below as u32;
-        let behind = earlier(slot.enter[below]) - slot.near_zero > slot.limit;
-        (below == 0) | behind | (Q::ANY & (slot.best_id != u32::MAX))
+        // SAFETY: passed on to the caller.
+        unsafe { self.query.settle::<L>(&self.exact, false) };
     }
 
     /// Tests the leaves of the first `n` waiting rays: all first blocks, all second blocks, and so
     /// on, so that no test waits for the outcome of the one before.
     ///
     /// Each block is only looked at first; few of them hold a triangle that the ray may hit, and
-    /// those are tested again in full.
+    /// those are tested again in full. Where a query takes all hits and most blocks have some, they are
+    /// tested in full at once.
     #[inline(always)]
     unsafe fn test_leaves<L: Simd, const SHAPES: bool>(&mut self, n: usize) {
+        let leaves = Leaves { tree: self.tree, geometry: self.geometry, exact: self.exact };
+        let slots = self.slots.as_mut_ptr();
         let mut tests = Tests::EMPTY;
+        let many = Q::MANY && self.struck as f64 >= WORTHWHILE * self.tested as f64;
         for i in 0..n {
             let (k, code) = self.lists.waiting.get(i);
             let count = self.tree.block_count(code);
@@ -245,11 +245,29 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
         }
         while tests.len > 0 {
             let n = std::mem::take(&mut tests.len);
+            if Q::MANY {
+                self.tested += n as u64;
+            }
             let (mut met, mut meeting) = (Tests::EMPTY, 0);
             for i in 0..n {
                 let (k, line, left) = tests.get(i);
-                // SAFETY: the codes of a tree lead to its blocks; the rest passed on to the caller.
-                let lanes = unsafe { self.meet_block::<L, SHAPES>(k, line as usize) };
+                self.events.block();
+                // SAFETY: lists hold numbers of slots, the codes of a tree lead to its blocks; the
+                // rest passed on to the caller.
+                let lanes = unsafe {
+                    let (slot, line) = (&mut *slots.add(k as usize), line as usize);
+                    if many {
+                        let shapes =
+                            if SHAPES { self.tree.lines().block(line).shape_lanes() } else { 0 };
+                        let (slot, lanes) = ((k, slot), shapes << WIDTH);
+                        let (open, struck) =
+                            leaves.test::<L, Q, E>(slot, line, lanes, self.query, self.events);
+                        self.struck += u64::from(struck);
+                        open
+                    } else {
+                        leaves.meet::<L, SHAPES>(slot, line)
+                    }
+                };
                 met.set(meeting, k, line, lanes);
                 meeting += usize::from(lanes != 0);
                 tests.set(tests.len, k, line + BLOCK_LINES as u32, left - 1);
@@ -264,82 +282,24 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
                 }
             }
             let (mut open, mut unsettled) = (Tests::EMPTY, 0);
-            for i in 0..meeting {
+            for i in 0..if many { 0 } else { meeting } {
                 let (k, line, lanes) = met.get(i);
                 // SAFETY: as above.
-                let lanes = unsafe { self.test_block::<L>(k, line as usize, lanes) };
+                let (lanes, struck) = unsafe {
+                    let slot = (k, &mut *slots.add(k as usize));
+                    leaves.test::<L, Q, E>(slot, line as usize, lanes, self.query, self.events)
+                };
+                if Q::MANY {
+                    self.struck += u64::from(struck);
+                }
                 open.set(unsettled, k, line, lanes);
                 unsettled += usize::from(lanes != 0);
             }
+            let (open, unsettled) = if many { (&met, meeting) } else { (&open, unsettled) };
             for i in 0..unsettled {
                 let (k, line, lanes) = open.get(i);
-                self.decide(k, line as usize, lanes);
-            }
-        }
-    }
-
-    /// The lanes of a block that the ray of slot `k` may hit: triangles in bits 7..0, others in
-    /// bits 15..8.
-    #[inline(always)]
-    unsafe fn meet_block<L: Simd, const SHAPES: bool>(&mut self, k: u32, line: usize) -> u32 {
-        // SAFETY: the caller vouches for the slot, the line and the features.
-        unsafe {
-            let slot = &*self.slots.as_ptr().add(k as usize);
-            let block = &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>();
-            let lanes = L::meets(slot, block);
-            self.events.block();
-            if SHAPES { lanes | block.shape_lanes() << WIDTH } else { lanes }
-        }
-    }
-
-    /// Tests a block that the ray of slot `k` meets; the lanes that need a decision in `f64`.
-    ///
-    /// No branches: which blocks hold a hit cannot be predicted, and a wrong guess would cost more
-    /// than a test.
-    #[inline(always)]
-    unsafe fn test_block<L: Simd>(&mut self, k: u32, line: usize, lanes: u32) -> u32 {
-        // SAFETY: the caller vouches for the slot, the line and the features.
-        unsafe {
-            let slot = &mut *self.slots.as_mut_ptr().add(k as usize);
-            let block = &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>();
-            let mut range = Range::default();
-            let Found { clear, open } = L::test(slot, block, &mut range);
-            self.events.found(clear, open);
-            let hits = Clear { lanes: clear, range: &range, block, line };
-            open | self.query.take_clear::<L>(k as usize, slot, &hits, &self.exact)
-                | lanes >> WIDTH << WIDTH
-        }
-    }
-
-    /// Decides the lanes of a block exactly: triangles in bits 7..0, others in bits 15..8.
-    #[cold]
-    fn decide(&mut self, k: u32, line: usize, mut lanes: u32) {
-        if lanes >> WIDTH != 0 {
-            self.test_shapes(k, line);
-            lanes &= (1 << WIDTH) - 1;
-        }
-        let slot = &mut self.slots[k as usize];
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            if let Some(hit) = self.exact.hit(slot.ray, place(line, lane)) {
-                self.query.take(k as usize, slot, &hit, &self.exact);
-            }
-            lanes &= lanes - 1;
-        }
-    }
-
-    /// Tests the primitives of a block that are no triangles.
-    fn test_shapes(&mut self, k: u32, line: usize) {
-        let slot = &mut self.slots[k as usize];
-        let block = self.tree.lines().block(line);
-        // `load` has refused what cannot be prepared.
-        let Some(ray) = PreparedRay::new(&self.exact.rays[slot.ray as usize]) else { return };
-        let mut lanes = block.shape_lanes();
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize & (WIDTH - 1);
-            lanes &= lanes - 1;
-            if let Some(hit) = self.geometry.intersect(block.id[lane] & ID_MASK, &ray) {
-                self.query.take(k as usize, slot, &hit, &self.exact);
+                let slot = (k, &mut self.slots[k as usize]);
+                leaves.decide(slot, line as usize, lanes, self.query);
             }
         }
     }
@@ -359,17 +319,24 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
             let (k, _) = self.lists.free.get(self.lists.free.len - 1);
             let (ray, slot) = (&rays[index], &mut self.slots[k as usize]);
             // SAFETY: passed on to the caller.
-            match unsafe { L::load(slot, ray, index as u32, &self.root) } {
-                Loaded::Ready => {
-                    self.events.ray();
-                    self.lists.free.len -= 1;
-                    slot.code[1] = code;
-                    self.moved.set(n, k, code);
-                    n += 1;
-                }
-                Loaded::Misses => self.query.miss(index),
-                Loaded::Extreme => self.walk_extreme(k),
+            let loaded = unsafe { L::load(slot, ray, index as u32, &self.root) };
+            if loaded == Loaded::Extreme {
+                self.walk_extreme(k);
+                continue;
             }
+            let ready = usize::from(loaded == Loaded::Ready);
+            if Q::MANY {
+                // Without a branch, since which chords miss the scene's box cannot be predicted: the
+                // next ray overwrites what such a ray leaves, and hits overwrite this.
+                self.query.miss(index);
+            } else if ready == 0 {
+                self.query.miss(index);
+                continue;
+            }
+            slot.code[1] = code;
+            self.moved.set(n, k, code);
+            (n, self.lists.free.len) = (n + ready, self.lists.free.len - ready);
+            self.events.rays(ready);
         }
         // SAFETY: passed on to the caller.
         unsafe { self.enlist::<L>(n) };

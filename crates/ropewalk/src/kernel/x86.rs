@@ -1,5 +1,10 @@
 //! What the x86-64 levels share: both compute in 256-bit registers with FMA and differ in how they
 //! mask and compress.
+//!
+//! Code for a level must be inlined into the function that enables its features, whatever the crate is
+//! compiled for. `#[inline(always)]` sees to that for functions, but a closure is inlined only if the
+//! compiler likes to, and where it does not, each instruction in it becomes a call. So vectors never
+//! pass through closures here and in beam/, nor through `map`, `fold` or `from_fn`.
 
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
@@ -7,7 +12,7 @@
 use super::level::{DEPTH_SLACK, Root, WEIGHT_SLACK};
 use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
 use crate::ray::Ray;
-use crate::wide::{Block, ORDER, Treelet};
+use crate::wide::{AXIS_SHIFTS, Block, Flips, ORDER, Treelet, WIDTH};
 use std::arch::x86_64::*;
 
 /// Axis orders of the shear by its last axis, as indices into a vector; the last lane stays.
@@ -85,6 +90,7 @@ pub unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loade
         slot.near_zero = NEAR_ZERO * reach * 2.0 * slot.half_scale;
         let (enter, exit) = (enter - slot.near_zero, exit + slot.near_zero);
         slot.may_lie_in_plane = false;
+        slot.flips = Flips::new(_mm_movemask_ps(inv) as u32);
         slot.start(ray, index);
         slot.push_root(root.code, enter, exit);
         if enter <= later(exit) { Loaded::Ready } else { Loaded::Misses }
@@ -103,12 +109,30 @@ pub struct Children {
     pub widened: __m256,
 }
 
+/// Bounds made narrower in some lanes, as each level does it best.
+///
+/// # Safety
+/// The methods may only run on a machine with the level's features.
+pub trait Narrow {
+    /// The larger of both in the lanes whose bits are set; NaN in `t` leaves the bound.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn max<const LANES: i32>(bound: __m256, t: __m256) -> __m256;
+
+    /// The smaller of both, likewise.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn min<const LANES: i32>(bound: __m256, t: __m256) -> __m256;
+}
+
 /// The step without its last part: masking and compressing.
 ///
 /// # Safety
 /// The machine must have AVX2 and FMA, and the caller must enable them; `sp` must be on the stack.
 #[inline(always)]
-pub unsafe fn children(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
+pub unsafe fn children<N: Narrow>(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
     debug_assert!(sp < super::slot::STACK);
     // SAFETY: the caller vouches for the features; all loads lie in the aligned treelet, the table
     // (index below 128) and the slot.
@@ -116,31 +140,29 @@ pub unsafe fn children(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
         let origin = _mm256_broadcast_ps(&*slot.origin.as_ptr().cast::<__m128>());
         let inv = _mm256_broadcast_ps(&*slot.inv.as_ptr().cast::<__m128>());
         let planes = _mm256_load_ps(treelet.plane.as_ptr());
-        let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        let shifts = _mm256_loadu_si256(AXIS_SHIFTS.as_ptr().cast());
         let axes = _mm256_srlv_epi32(_mm256_set1_epi32(treelet.axes as i32), shifts);
         let inv = _mm256_permutevar_ps(inv, axes);
         let origin = _mm256_permutevar_ps(origin, axes);
         let t = _mm256_mul_ps(_mm256_sub_ps(planes, origin), inv);
 
-        let signs = _mm256_movemask_ps(inv) as usize & 127;
-        let row = ORDER.0.as_ptr().add(signs).cast::<__m128i>();
-        let packed = _mm256_cvtepu16_epi32(_mm_load_si128(row));
+        let row = ORDER.0.as_ptr().cast::<u8>().add(treelet.order_offset(slot.flips));
+        let packed = _mm256_cvtepu16_epi32(_mm_load_si128(row.cast()));
         let t0 = _mm256_broadcastss_ps(_mm256_castps256_ps128(t));
         let t1 = _mm256_permutevar8x32_ps(t, _mm256_srli_epi32::<3>(packed));
         let t2 = _mm256_permutevar8x32_ps(t, _mm256_srli_epi32::<6>(packed));
         let children = _mm256_load_si256(treelet.child.as_ptr().cast());
         let children = _mm256_permutevar8x32_epi32(children, packed);
 
-        // max and min return their second operand where the first is NaN: such a plane bounds
-        // neither side.
+        // A plane at NaN bounds neither side.
         let enter = _mm256_set1_ps(*slot.enter.get_unchecked(sp));
         let exit = _mm256_set1_ps(*slot.exit.get_unchecked(sp));
-        let enter = _mm256_blend_ps::<0x0F>(enter, _mm256_max_ps(t0, enter));
-        let exit = _mm256_blend_ps::<0xF0>(exit, _mm256_min_ps(t0, exit));
-        let enter = _mm256_blend_ps::<0x33>(enter, _mm256_max_ps(t1, enter));
-        let exit = _mm256_blend_ps::<0xCC>(exit, _mm256_min_ps(t1, exit));
-        let enter = _mm256_blend_ps::<0x55>(enter, _mm256_max_ps(t2, enter));
-        let exit = _mm256_blend_ps::<0xAA>(exit, _mm256_min_ps(t2, exit));
+        let enter = N::max::<0x0F>(enter, t0);
+        let exit = N::min::<0xF0>(exit, t0);
+        let enter = N::max::<0x33>(enter, t1);
+        let exit = N::min::<0xCC>(exit, t1);
+        let enter = N::max::<0x55>(enter, t2);
+        let exit = N::min::<0xAA>(exit, t2);
 
         let size = _mm256_andnot_ps(SIGN, exit);
         let widened = _mm256_fmadd_ps(size, _mm256_set1_ps(INTERVAL_SLACK), exit);
@@ -174,42 +196,66 @@ pub struct Lanes {
 // SAFETY: both types are eight floats, and any bits are valid in either.
 pub const SIGN: __m256 = unsafe { std::mem::transmute::<[f32; 8], __m256>([-0.0; 8]) };
 
+/// Coordinates along the `a`-th axis of the ray's frame, relative to its origin.
+#[inline(always)]
+unsafe fn offset(slot: &Slot, vertex: &[[f32; WIDTH]; 3], a: usize) -> __m256 {
+    // SAFETY: passed on to the caller; axes are below 3 and rows are aligned.
+    unsafe {
+        let row = vertex.get_unchecked(*slot.k.get_unchecked(a) as usize);
+        _mm256_sub_ps(_mm256_load_ps(row.as_ptr()), _mm256_set1_ps(slot.shear_origin[a]))
+    }
+}
+
+/// A vertex of eight triangles in the ray's frame: two coordinates across, and its parameter.
+#[inline(always)]
+unsafe fn sheared(slot: &Slot, vertex: &[[f32; WIDTH]; 3]) -> [__m256; 3] {
+    // SAFETY: passed on to the caller.
+    unsafe {
+        let [sx, sy, sz] = slot.shear;
+        let z = offset(slot, vertex, 2);
+        let x = _mm256_fnmadd_ps(_mm256_set1_ps(sx), z, offset(slot, vertex, 0));
+        let y = _mm256_fnmadd_ps(_mm256_set1_ps(sy), z, offset(slot, vertex, 1));
+        [x, y, _mm256_mul_ps(_mm256_set1_ps(sz), z)]
+    }
+}
+
+/// The edge function of two vertices.
+#[inline(always)]
+unsafe fn edge(p: [__m256; 3], q: [__m256; 3]) -> __m256 {
+    // SAFETY: passed on to the caller.
+    unsafe { _mm256_fmsub_ps(p[0], q[1], _mm256_mul_ps(p[1], q[0])) }
+}
+
+/// The largest absolute value of three numbers, lane by lane.
+#[inline(always)]
+unsafe fn size(p: __m256, q: __m256, r: __m256) -> __m256 {
+    // SAFETY: passed on to the caller.
+    unsafe {
+        let pq = _mm256_max_ps(_mm256_andnot_ps(SIGN, p), _mm256_andnot_ps(SIGN, q));
+        _mm256_max_ps(pq, _mm256_andnot_ps(SIGN, r))
+    }
+}
+
 /// The test without its comparisons.
 ///
 /// # Safety
 /// As for [`children`].
 #[inline(always)]
 pub unsafe fn lanes(slot: &Slot, block: &Block) -> Lanes {
-    // SAFETY: the caller vouches for the features; all loads are of whole aligned rows.
+    // SAFETY: the caller vouches for the features.
     unsafe {
-        let row = |i: usize, a: usize| {
-            let axis = *slot.k.get_unchecked(a) as usize;
-            _mm256_load_ps(block.vertex.get_unchecked(i).get_unchecked(axis).as_ptr())
-        };
-        let origin = slot.shear_origin.map(|x| _mm256_set1_ps(x));
-        let [sx, sy, sz] = slot.shear.map(|x| _mm256_set1_ps(x));
-        let vertex = |i: usize| {
-            let z = _mm256_sub_ps(row(i, 2), origin[2]);
-            let x = _mm256_sub_ps(row(i, 0), origin[0]);
-            let y = _mm256_sub_ps(row(i, 1), origin[1]);
-            [_mm256_fnmadd_ps(sx, z, x), _mm256_fnmadd_ps(sy, z, y), _mm256_mul_ps(sz, z)]
-        };
-        let (a, b, c) = (vertex(0), vertex(1), vertex(2));
-        let edge =
-            |p: [__m256; 3], q: [__m256; 3]| _mm256_fmsub_ps(p[0], q[1], _mm256_mul_ps(p[1], q[0]));
+        let a = sheared(slot, &block.vertex[0]);
+        let b = sheared(slot, &block.vertex[1]);
+        let c = sheared(slot, &block.vertex[2]);
         let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
         let low = _mm256_min_ps(_mm256_min_ps(u, v), w);
         let high = _mm256_max_ps(_mm256_max_ps(u, v), w);
 
-        let size = |i: usize| {
-            let [p, q, r] = [a[i], b[i], c[i]].map(|x| _mm256_andnot_ps(SIGN, x));
-            _mm256_max_ps(_mm256_max_ps(p, q), r)
-        };
         let near = _mm256_min_ps(_mm256_min_ps(a[2], b[2]), c[2]);
         let far = _mm256_max_ps(_mm256_max_ps(a[2], b[2]), c[2]);
         let reach = _mm256_max_ps(_mm256_andnot_ps(SIGN, near), _mm256_andnot_ps(SIGN, far));
         let blur = _mm256_mul_ps(reach, _mm256_set1_ps(DEPTH_SLACK));
-        let sum = _mm256_add_ps(size(0), size(1));
+        let sum = _mm256_add_ps(size(a[0], b[0], c[0]), size(a[1], b[1], c[1]));
         let scale = _mm256_fmadd_ps(sum, _mm256_set1_ps(slot.half_scale), reach);
         let slack = _mm256_mul_ps(sum, _mm256_set1_ps(slot.edge_slack));
         let slack = _mm256_fmadd_ps(slack, scale, _mm256_set1_ps(TINY));

@@ -220,7 +220,7 @@ impl Compiler<'_> {
         match self.tree.kind(node) {
             NodeKind::Inner { axis, split, left, right } if level < LEVELS => {
                 treelet.plane[heap] = split;
-                treelet.axes |= (axis as u32) << (4 * heap);
+                treelet.set_axis(heap, axis);
                 let upper = child | 1 << (2 - level);
                 self.fill(treelet, roots, left, level + 1, 2 * heap + 1, child);
                 self.fill(treelet, roots, right, level + 1, 2 * heap + 2, upper);

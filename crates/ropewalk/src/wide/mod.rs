@@ -13,8 +13,8 @@ mod validate;
 pub use block::{Block, ID_MASK, NO_ID, SIDES_BACK, SIDES_BOTH, SIDES_FRONT, WIDTH};
 pub use lines::{BLOCK_LINES, LINE, Lines};
 pub use treelet::{
-    COUNT_BITS, COUNT_OVERFLOW, LEAF, LEVELS, MAX_LINES, ORDER, OrderTable, Treelet, code_line,
-    code_offset, leaf_code, treelet_code,
+    AXIS_SHIFTS, COUNT_BITS, COUNT_OVERFLOW, Flips, LEAF, LEVELS, MAX_LINES, ORDER, OrderTable,
+    Treelet, code_line, code_offset, leaf_code, treelet_code,
 };
 pub use validate::WideFault;
 

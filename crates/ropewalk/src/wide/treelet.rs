@@ -4,7 +4,8 @@
 ///
 /// ```text
 /// bytes  0..28   plane[h]: split positions in heap order (0; 1, 2; 3, 4, 5, 6), +inf where absent
-/// bytes 28..32   axes: 4 bits a plane, plane h in bits 4h..4h+4; bits 28..32 are 0
+/// bytes 28..32   axes: plane h in bits 2h and 2h+1; bit 14+h: across y, bit 21+h: across z; bits
+///                28..32 are 0
 /// bytes 32..64   child[c]: c is the path from the root, first level in bit 2; upper side is 1
 ///
 /// child code     0                 an empty cell
@@ -19,7 +20,7 @@
 pub struct Treelet {
     /// Split positions in heap order.
     pub plane: [f32; 7],
-    /// Axes, four bits each.
+    /// Axes; see [`Treelet::axis`] and [`Flips`].
     pub axes: u32,
     /// Child codes.
     pub child: [u32; 8],
@@ -44,9 +45,56 @@ impl Treelet {
 
     /// The axis of plane `h`.
     pub fn axis(&self, h: usize) -> usize {
-        (self.axes >> (4 * h) & 3) as usize
+        (self.axes >> (2 * h) & 3) as usize
+    }
+
+    /// Sets the axis of plane `h`, which was 0.
+    pub fn set_axis(&mut self, h: usize, axis: usize) {
+        self.axes |= (axis as u32) << (2 * h);
+        self.axes |= [0, 1 << 14, 1 << 21][axis] << h;
+    }
+
+    /// The row of [`ORDER`] for a ray, in bytes.
+    #[inline(always)]
+    pub fn order_offset(&self, flips: Flips) -> usize {
+        let flipped = self.axes & flips.others;
+        ((flipped >> 10 ^ flipped >> 17 ^ flips.all) & 0x7F0) as usize
     }
 }
+
+/// Where the bits of plane `h`'s axis begin, by lane; the last lane holds no plane.
+pub const AXIS_SHIFTS: [u32; 8] = [0, 2, 4, 6, 8, 10, 12, 14];
+
+/// The signs of a ray's direction, spread over the planes of a treelet so that those of all seven are
+/// found in a few steps: the sign along x, turned over where a plane's axis has another one.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct Flips {
+    /// Bits of [`Treelet::axes`] where the axis is y or z and its sign not that of x.
+    others: u32,
+    /// The sign along x for each row of [`ORDER`] of 16 bytes.
+    all: u32,
+}
+
+impl Flips {
+    /// For directions with these signs, the axis' bit set if it is negative.
+    #[inline(always)]
+    pub const fn new(signs: u32) -> Flips {
+        FLIPS[signs as usize & 7]
+    }
+}
+
+static FLIPS: [Flips; 8] = {
+    let mut flips = [Flips { others: 0, all: 0 }; 8];
+    let mut signs = 0;
+    while signs < 8 {
+        let [x, y, z] = [signs as u32 & 1, signs as u32 >> 1 & 1, signs as u32 >> 2];
+        let others = ((x ^ y) * 0x7F) << 14 | ((x ^ z) * 0x7F) << 21;
+        flips[signs] = Flips { others, all: (x * 0x7F) << 4 };
+        signs += 1;
+    }
+    flips
+};
 
 /// The code of a treelet.
 pub fn treelet_code(line: u32) -> u32 {
@@ -112,3 +160,25 @@ impl Default for OrderTable {
 
 /// The one table of the crate.
 pub static ORDER: OrderTable = OrderTable::new();
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signs_are_those_of_the_axes() {
+        for numbers in 0..3usize.pow(7) {
+            let axis = |h: usize| numbers / 3usize.pow(h as u32) % 3;
+            let mut treelet = Treelet::EMPTY;
+            (0..7).for_each(|h| treelet.set_axis(h, axis(h)));
+            assert!((0..7).all(|h| treelet.axis(h) == axis(h)));
+            for signs in 0..8 {
+                let expected: usize = (0..7).map(|h| (signs as usize >> axis(h) & 1) << h).sum();
+                assert_eq!(
+                    treelet.order_offset(Flips::new(signs)),
+                    expected * size_of::<[u16; 8]>()
+                );
+            }
+        }
+    }
+}

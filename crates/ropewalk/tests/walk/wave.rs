@@ -37,6 +37,8 @@ pub fn check(geometry: &Geometry, tree: &BspTree, rays: &[Ray]) {
         for (i, ray) in rays.iter().enumerate() {
             let expected = closest[i].map_or((f32::INFINITY, u32::MAX), |h| (h.t, h.prim_id));
             assert_eq!((hits.t[i], hits.prim_id[i]), expected, "{level} closest, {ray:?}");
+            assert_eq!(caster.closest_hit_one(ray), closest[i], "{level} closest, one, {ray:?}");
+            assert_eq!(caster.occluded_one(ray), closest[i].is_some(), "{level} one, {ray:?}");
             assert_eq!(occluded[i], closest[i].is_some(), "{level} occluded, {ray:?}");
             let row = |of: &AllHits| {
                 let range = of.offsets[i]..of.offsets[i + 1];
@@ -237,12 +239,18 @@ fn filters_see_every_hit_that_matters() {
                 let prims = 0..geometry.len() as u32;
                 let mut every: Vec<_> =
                     prims.filter_map(|id| geometry.intersect(id, &prepared)).collect();
-                let whole = every.len();
-                every.retain(|hit| filter.accepts(i, hit));
-                refused += whole - every.len();
                 every.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.prim_id.cmp(&b.prim_id)));
+                let whole = every.clone();
+                every.retain(|hit| filter.accepts(i, hit));
+                refused += whole.len() - every.len();
                 let first = every.first().map_or((f32::INFINITY, u32::MAX), |h| (h.t, h.prim_id));
                 assert_eq!((hits.t[i], hits.prim_id[i]), first);
+                // By itself a ray is ray 0.
+                let as_first = |hit: &&Hit| filter.accepts(0, hit);
+                let one = caster.closest_hit_one(ray).map(|hit| (hit.t, hit.prim_id));
+                let mut alone = whole.iter().filter(as_first);
+                assert_eq!(one, alone.next().map(|hit| (hit.t, hit.prim_id)));
+                assert_eq!(caster.occluded_one(ray), one.is_some());
                 assert_eq!(occluded[i], !every.is_empty());
                 assert_eq!(counts[i] as usize, every.len());
                 let ids: Vec<_> = every.iter().map(|h| h.prim_id).collect();
@@ -288,6 +296,37 @@ fn threads_do_not_change_answers() {
     assert_eq!(all.closest_hit(&rays), one.closest_hit(&rays));
     assert_eq!(all.occluded(&rays), one.occluded(&rays));
     assert_eq!(all.all_hits(&rays), one.all_hits(&rays));
+    let mut kept = AllHits::default();
+    for (rays, k) in [(&rays[..], 8), (&rays[..5000], 1), (&rays[..100], usize::MAX), (&[], 2)] {
+        for caster in [all, one] {
+            caster.first_hits_into(rays, k, &mut kept);
+            assert_eq!(kept, one.first_hits(rays, k));
+        }
+    }
+    one.first_hits_into(&rays[..3], 0, &mut kept);
+    assert_eq!((kept.offsets, kept.t), (vec![0; 4], vec![]));
+}
+
+/// A filter may ask about other rays, and the calls do not disturb each other.
+#[test]
+fn a_filter_may_cast_single_rays() {
+    let mut draw = Draw::new(13);
+    let geometry = scenes::soup(&mut draw, 300, 1.0);
+    let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+    let wide = WideTree::compile(&tree, &geometry).unwrap();
+    let inner = BatchCaster::new(&wide, &geometry);
+    let mut refused = 0;
+    for _ in 0..500 {
+        let ray = generic_ray(&mut draw, &geometry.bounds());
+        let first = inner.closest_hit_one(&ray);
+        let not_first = |_: usize, hit: &Hit| inner.closest_hit_one(&ray) != Some(*hit);
+        let second = inner.with_filter(not_first).closest_hit_one(&ray);
+        let expected = every_hit(&geometry, &ray);
+        assert_eq!(first.map(|hit| (hit.t + 0.0, hit.prim_id)), expected.first().copied());
+        assert_eq!(second.map(|hit| (hit.t + 0.0, hit.prim_id)), expected.get(1).copied());
+        refused += usize::from(second.is_some());
+    }
+    assert!(refused > 50, "{refused}");
 }
 
 #[test]
@@ -298,6 +337,8 @@ fn an_empty_tree_is_missed() {
     let caster = BatchCaster::new(&wide, &geometry);
     let rays = [Ray::new([0.0; 3], [1.0, 0.0, 0.0])];
     assert_eq!(caster.occluded(&rays), [false]);
+    assert_eq!(caster.closest_hit_one(&rays[0]), None);
+    assert!(!caster.occluded_one(&rays[0]));
     assert_eq!(caster.all_hits(&rays).offsets, [0, 0]);
     assert!(caster.closest_hit(&[]).t.is_empty());
 }

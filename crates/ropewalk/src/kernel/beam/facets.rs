@@ -67,34 +67,20 @@ impl Facets {
     pub unsafe fn project<V: Vector>(&mut self, frame: &Frame, radius: [f32; 2], block: &Block) {
         // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
         unsafe {
-            let [kx, ky, kz] = frame.axis;
-            let [px, py, pz] = frame.axis.map(|k| V::splat(frame.point[k]));
-            let (sx, sy) = (V::splat(frame.slope[0]), V::splat(frame.slope[1]));
-            let sign = V::splat(frame.sign);
-            let one = V::splat(1.0);
-            let corner = |i: usize| {
-                let row = |k: usize| V::load(&block.vertex[i][k]);
-                let z = (row(kz) - pz) * sign;
-                let x = sx.neg_mul_add(z, row(kx) - px);
-                let y = sy.neg_mul_add(z, row(ky) - py);
-                let h = if frame.concentric { z } else { one };
-                [x, y, z, h]
-            };
-            let [a, b, c] = [corner(0), corner(1), corner(2)];
-            let edge = |p: [V; 4], q: [V; 4]| {
-                [p[0] * q[1] - p[1] * q[0], p[1] * q[3] - p[3] * q[1], p[3] * q[0] - p[0] * q[3]]
-            };
+            let a = corner::<V>(frame, &block.vertex[0]);
+            let b = corner::<V>(frame, &block.vertex[1]);
+            let c = corner::<V>(frame, &block.vertex[2]);
             // The edges in the order of the triangle test, so that signs agree.
             let edges = [edge(c, b), edge(a, c), edge(b, a)];
             let sum = edges[0][0] + edges[1][0] + edges[2][0];
-            for (rows, edge) in self.edge.iter_mut().zip(edges) {
-                for (row, x) in rows.iter_mut().zip(edge) {
-                    x.flip(sum).store(row);
+            for e in 0..3 {
+                for factor in 0..3 {
+                    edges[e][factor].flip(sum).store(&mut self.edge[e][factor]);
                 }
             }
-            for (row, p) in self.depth.iter_mut().zip([a, b, c]) {
-                p[2].store(row);
-            }
+            a[2].store(&mut self.depth[0]);
+            b[2].store(&mut self.depth[1]);
+            c[2].store(&mut self.depth[2]);
             let (near, far) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
             let away = near.abs().max(far.abs());
             let rounding = V::splat(DEPTH_SLACK) * away;
@@ -102,18 +88,34 @@ impl Facets {
             (near - rounding).store(&mut self.range[0]);
             (far + rounding).store(&mut self.range[1]);
             // Extent of the vertices, and of vertices and rays.
-            let [[wide_x, size_x], [wide_y, size_y]] = std::array::from_fn(|i| {
-                let low = a[i].min(b[i]).min(c[i]);
-                let high = a[i].max(b[i]).max(c[i]);
-                let h = if frame.concentric { away } else { one };
-                [V::splat(radius[i]).mul_add(h, low.abs().max(high.abs())), high - low]
-            });
+            let h = if frame.concentric { away } else { V::splat(1.0) };
+            let (low_x, high_x) = (a[0].min(b[0]).min(c[0]), a[0].max(b[0]).max(c[0]));
+            let (low_y, high_y) = (a[1].min(b[1]).min(c[1]), a[1].max(b[1]).max(c[1]));
+            let (size_x, size_y) = (high_x - low_x, high_y - low_y);
+            let wide_x = V::splat(radius[0]).mul_add(h, low_x.abs().max(high_x.abs()));
+            let wide_y = V::splat(radius[1]).mul_add(h, low_y.abs().max(high_y.abs()));
             let across = V::splat(CORNER_SLACK).mul_add(away, V::splat(2.0 * frame.stray));
             let rounded = V::splat(PRODUCT_SLACK) * wide_x * wide_y;
             across.mul_add(wide_x + wide_y, rounded).store(&mut self.slack);
             let blur = across.mul_add(size_x + size_y, rounded) * (far - near);
             (blur + blur).store(&mut self.blur);
             self.culled = culled(block, V::splat(0.0).lt(sum));
+        }
+    }
+
+    /// Edge function `e` in the middle of a packet, how far it may be from that in the packet, and its
+    /// two factors.
+    #[inline(always)]
+    unsafe fn reach<V: Vector>(&self, e: usize, packet: &Packet) -> [V; 4] {
+        // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
+        unsafe {
+            let (a, b) = (V::splat(packet.middle[0]), V::splat(packet.middle[1]));
+            let (ra, rb) = (V::splat(packet.radius[0]), V::splat(packet.radius[1]));
+            let [constant, by_a, by_b] = &self.edge[e];
+            let (by_a, by_b) = (V::load(by_a), V::load(by_b));
+            let middle = b.mul_add(by_b, a.mul_add(by_a, V::load(constant)));
+            let reach = rb.mul_add(by_b.abs(), ra.mul_add(by_a.abs(), V::load(&self.slack)));
+            [middle, reach, by_a, by_b]
         }
     }
 
@@ -125,15 +127,11 @@ impl Facets {
     pub unsafe fn facing<V: Vector>(&self, packet: &Packet) -> Facing {
         // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
         unsafe {
-            let [a, b] = packet.middle.map(|x| V::splat(x));
-            let [ra, rb] = packet.radius.map(|x| V::splat(x));
+            let (ra, rb) = (V::splat(packet.radius[0]), V::splat(packet.radius[1]));
             let slack = V::load(&self.slack);
-            let [u, v, w] = self.edge.each_ref().map(|[constant, by_a, by_b]| {
-                let (by_a, by_b) = (V::load(by_a), V::load(by_b));
-                let middle = b.mul_add(by_b, a.mul_add(by_a, V::load(constant)));
-                let reach = rb.mul_add(by_b.abs(), ra.mul_add(by_a.abs(), slack));
-                [middle, reach, by_a, by_b]
-            });
+            let u = self.reach::<V>(0, packet);
+            let v = self.reach::<V>(1, packet);
+            let w = self.reach::<V>(2, packet);
             let zero = V::splat(0.0);
             let high = (u[0] + u[1]).min(v[0] + v[1]).min(w[0] + w[1]);
             let low = (u[0] - u[1]).max(v[0] - v[1]).max(w[0] - w[1]);
@@ -152,6 +150,27 @@ impl Facets {
     }
 }
 
+/// A vertex of eight triangles in a frame: `x`, `y`, `z` and `h`.
+#[inline(always)]
+unsafe fn corner<V: Vector>(frame: &Frame, vertex: &[Row; 3]) -> [V; 4] {
+    // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
+    unsafe {
+        let [kx, ky, kz] = frame.axis;
+        let z = (V::load(&vertex[kz]) - V::splat(frame.point[kz])) * V::splat(frame.sign);
+        let x = V::load(&vertex[kx]) - V::splat(frame.point[kx]);
+        let y = V::load(&vertex[ky]) - V::splat(frame.point[ky]);
+        let h = if frame.concentric { z } else { V::splat(1.0) };
+        let x = V::splat(frame.slope[0]).neg_mul_add(z, x);
+        [x, V::splat(frame.slope[1]).neg_mul_add(z, y), z, h]
+    }
+}
+
+/// Constant and factors of an edge function.
+#[inline(always)]
+fn edge<V: Vector>(p: [V; 4], q: [V; 4]) -> [V; 3] {
+    [p[0] * q[1] - p[1] * q[0], p[1] * q[3] - p[3] * q[1], p[3] * q[0] - p[0] * q[3]]
+}
+
 /// The lanes of a packet that a triangle concerns.
 pub struct Verdict {
     /// Lanes that it hits for certain, in front of what they hit before.
@@ -161,6 +180,17 @@ pub struct Verdict {
 }
 
 impl Facets {
+    /// Edge function `e` of triangle `i` for rays at `(a, b)`.
+    #[inline(always)]
+    unsafe fn at<V: Vector>(&self, e: usize, i: usize, a: V, b: V) -> V {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            let [constant, by_a, by_b] = &self.edge[e];
+            let u = a.mul_add(V::splat(by_a[i]), V::splat(constant[i]));
+            b.mul_add(V::splat(by_b[i]), u)
+        }
+    }
+
     /// Tests triangle `i`, seen from one side, with all active rays of a packet; takes certain hits.
     ///
     /// # Safety
@@ -176,12 +206,7 @@ impl Facets {
         // SAFETY: passed on to the caller; rows have `RAYS` numbers.
         unsafe {
             let (a, b) = (V::load(&packet.at[0]), V::load(&packet.at[1]));
-            let edge = |e: usize| {
-                let [constant, by_a, by_b] = &self.edge[e];
-                let u = a.mul_add(V::splat(by_a[i]), V::splat(constant[i]));
-                b.mul_add(V::splat(by_b[i]), u)
-            };
-            let (u, v, w) = (edge(0), edge(1), edge(2));
+            let (u, v, w) = (self.at(0, i, a, b), self.at(1, i, a, b), self.at(2, i, a, b));
             let low = u.min(v).min(w);
             let slack = self.slack[i];
             let touched = V::splat(-slack).le(low) & packet.active;
@@ -189,7 +214,7 @@ impl Facets {
                 return Verdict { hit: 0, open: 0 };
             }
             let inside = V::splat(2.0 * slack).le(low) & touched;
-            let [za, zb, zc] = [0, 1, 2].map(|c| self.depth[c][i]);
+            let (za, zb, zc) = (self.depth[0][i], self.depth[1][i], self.depth[2][i]);
             let r = V::splat(1.0).div(u + v + w);
             let z = w.mul_add(V::splat(zc - za), v * V::splat(zb - za));
             let z = z.mul_add(r, V::splat(za));
@@ -198,8 +223,8 @@ impl Facets {
             let rounding = V::splat(self.rounding[i] + packet.rounding);
             let blur = weight.mul_add(V::splat(self.blur[i]), rounding);
             let (near, far) = (z - blur, z + blur);
-            let [best_low, best_high] = packet.best.each_ref().map(|row| V::load(row));
-            let [min_low, min_high] = packet.z_min.each_ref().map(|row| V::load(row));
+            let (best_low, best_high) = (V::load(&packet.best[0]), V::load(&packet.best[1]));
+            let (min_low, min_high) = (V::load(&packet.z_min[0]), V::load(&packet.z_min[1]));
             let hit = inside & far.lt(best_low) & min_high.lt(near);
             // Not certainly behind the best hit or before the range.
             let matters = inside & near.le(best_high) & min_low.le(far) & !hit;
@@ -228,12 +253,7 @@ impl Facets {
         // SAFETY: passed on to the caller; rows have `RAYS` numbers.
         unsafe {
             let (a, b) = (V::load(&packet.at[0]), V::load(&packet.at[1]));
-            let edge = |e: usize| {
-                let [constant, by_a, by_b] = &self.edge[e];
-                let u = a.mul_add(V::splat(by_a[i]), V::splat(constant[i]));
-                b.mul_add(V::splat(by_b[i]), u)
-            };
-            let (u, v, w) = (edge(0), edge(1), edge(2));
+            let (u, v, w) = (self.at(0, i, a, b), self.at(1, i, a, b), self.at(2, i, a, b));
             let (low, high) = (u.min(v).min(w), u.max(v).max(w));
             let slack = self.slack[i];
             let outside = low.lt(V::splat(-slack)) & V::splat(slack).lt(high);

@@ -173,10 +173,12 @@ impl Packet {
         // SAFETY: passed on to the caller.
         unsafe {
             let zero = V::splat(0.0);
-            std::array::from_fn(|a| {
+            let mut far = [0.0; 3];
+            for a in 0..3 {
                 let away = (V::load(&self.origin[a]) - V::splat(point[a])).abs();
-                away.select(lanes, zero).highest()
-            })
+                far[a] = away.select(lanes, zero).highest();
+            }
+            far
         }
     }
 
@@ -186,15 +188,29 @@ impl Packet {
         // SAFETY: passed on to the caller.
         unsafe {
             let [kx, ky, kz] = frame.axis;
-            let from = |a: usize| V::load(&self.origin[a]) - V::splat(frame.point[a]);
-            let start = from(kz) * V::splat(frame.sign);
-            let x = V::load(&self.slope[0]).neg_mul_add(start, from(kx));
-            let y = V::load(&self.slope[1]).neg_mul_add(start, from(ky));
+            let x = V::load(&self.origin[kx]) - V::splat(frame.point[kx]);
+            let y = V::load(&self.origin[ky]) - V::splat(frame.point[ky]);
+            let z = V::load(&self.origin[kz]) - V::splat(frame.point[kz]);
+            let start = z * V::splat(frame.sign);
+            let x = V::load(&self.slope[0]).neg_mul_add(start, x);
+            let y = V::load(&self.slope[1]).neg_mul_add(start, y);
             start.store(&mut self.start);
             x.store(&mut self.at[0]);
             y.store(&mut self.at[1]);
         }
     }
+}
+
+/// Largest distance of the packets' origins from a point, on any axis.
+#[inline(always)]
+unsafe fn away<V: Vector>(packets: &[Packet], point: [f32; 3]) -> f32 {
+    let mut far = 0.0;
+    for p in packets {
+        // SAFETY: passed on to the caller.
+        let [x, y, z] = unsafe { p.away::<V>(point, p.lanes) };
+        far = x.max(y).max(z).max(far);
+    }
+    far
 }
 
 /// Bounds of coordinates and directions within which no product overflows or vanishes.
@@ -271,12 +287,7 @@ impl Frame {
                 })
             };
             let leader = self.point;
-            let away = |packets: &[Packet], point| {
-                packets.iter().fold(0.0f32, |far, p| {
-                    p.away::<V>(point, p.lanes).into_iter().fold(far, f32::max)
-                })
-            };
-            let around = away(packets, leader);
+            let around = away::<V>(packets, leader);
             self.reach = scene(leader).max(around);
             self.cross_all::<V>(packets);
             if around > 0.0 {
@@ -289,7 +300,7 @@ impl Frame {
                     self.point[kx] = leader[kx] + (x + sx * focus);
                     self.point[ky] = leader[ky] + (y + sy * focus);
                     self.point[kz] = leader[kz] + focus * self.sign;
-                    self.reach = scene(self.point).max(away(packets, self.point));
+                    self.reach = scene(self.point).max(away::<V>(packets, self.point));
                     self.cross_all::<V>(packets);
                     let stray = self.extent::<V>(packets, |p| &p.at);
                     let stray = stray.iter().flatten().fold(0.0, |m: f32, x| m.max(x.abs()));
@@ -328,7 +339,8 @@ impl Frame {
     ) -> [[f32; 2]; 2] {
         // SAFETY: passed on to the caller.
         unsafe {
-            std::array::from_fn(|i| {
+            let mut extent = [[0.0; 2]; 2];
+            for i in 0..2 {
                 let mut low = V::splat(f32::INFINITY);
                 let mut high = V::splat(f32::NEG_INFINITY);
                 for p in packets {
@@ -336,8 +348,9 @@ impl Frame {
                     low = low.min(x.select(p.lanes, low));
                     high = high.max(x.select(p.lanes, high));
                 }
-                [low.lowest(), high.highest()]
-            })
+                extent[i] = [low.lowest(), high.highest()];
+            }
+            extent
         }
     }
 
@@ -368,10 +381,15 @@ impl Frame {
         unsafe {
             let zero = V::splat(0.0);
             let count: u32 = packets.iter().map(|p| p.lanes.count_ones()).sum();
-            std::array::from_fn(|i| {
-                let add = |sum: V, p: &Packet| sum + V::load(&rows(p)[i]).select(p.lanes, zero);
-                packets.iter().fold(zero, add).sum() / count as f32
-            })
+            let mut mean = [0.0; 2];
+            for i in 0..2 {
+                let mut sum = zero;
+                for p in packets {
+                    sum = sum + V::load(&rows(p)[i]).select(p.lanes, zero);
+                }
+                mean[i] = sum.sum() / count as f32;
+            }
+            mean
         }
     }
 
@@ -433,9 +451,9 @@ impl Frame {
         // SAFETY: passed on to the caller.
         let (slopes, origins) = unsafe {
             let slopes = self.extent::<V>(packets, |p| &p.slope);
-            let parallel = !self.concentric;
-            let origins = parallel.then(|| self.extent::<V>(packets, |p| &p.at));
-            (slopes, origins.unwrap_or_default())
+            let concentric = self.concentric;
+            let none = [[0.0; 2]; 2];
+            (slopes, if concentric { none } else { self.extent::<V>(packets, |p| &p.at) })
         };
         let mut shaft =
             Shaft { first: [0.0; 4], last: [0.0; 4], inv: [0.0; 4], inv_wide: [0.0; 4] };
@@ -449,6 +467,18 @@ impl Frame {
         let z = self.axis[2];
         shaft.set(z, [self.point[z] - slack, self.point[z] + slack], [self.sign; 2]);
         shaft
+    }
+
+    /// Bounds of the depths at which parameters end; nothing lies farther away than the reach.
+    #[inline(always)]
+    unsafe fn depth<V: Vector>(&self, t: &[f32; RAYS], scale: V, start: V) -> [V; 2] {
+        // SAFETY: passed on to the caller; rows have `RAYS` numbers.
+        unsafe {
+            let (near, far) = (V::splat(-2.0 * self.reach), V::splat(2.0 * self.reach));
+            let z = V::load(t).mul_add(scale, start).min(far).max(near);
+            let slack = V::splat(DEPTH_SLACK) * (z.abs() + start.abs());
+            [z - slack, z + slack]
+        }
     }
 
     /// Sets the middle and the radius of a packet, and the depths of its ranges.
@@ -465,14 +495,8 @@ impl Frame {
                 p.radius[i] = (high - p.middle[i]).max(p.middle[i] - low) * (1.0 + 4.0 * U);
             }
             let (start, scale) = (V::load(&p.start), V::load(&p.scale));
-            // Nothing lies farther away than the reach.
-            let (near, far) = (V::splat(-2.0 * self.reach), V::splat(2.0 * self.reach));
-            let depth = |row: &[f32]| {
-                let z = V::load(row).mul_add(scale, start).min(far).max(near);
-                let slack = V::splat(DEPTH_SLACK) * (z.abs() + start.abs());
-                [z - slack, z + slack]
-            };
-            let ([from, from_high], [to_low, to]) = (depth(&p.t[0]), depth(&p.t[1]));
+            let [from, from_high] = self.depth(&p.t[0], scale, start);
+            let [to_low, to] = self.depth(&p.t[1], scale, start);
             from.store(&mut p.z_min[0]);
             from_high.store(&mut p.z_min[1]);
             to_low.store(&mut p.best[0]);

@@ -27,6 +27,9 @@ mod vector;
 mod x86;
 
 pub use shaft::BeamSimd;
+pub use vector::Doubles;
+#[cfg(target_arch = "x86_64")]
+pub use x86::{EightDoubles, FourDoubles};
 
 use super::exact::{At, Exact, place};
 use super::query::{Any, BatchQuery, Closest};

@@ -15,7 +15,6 @@ use std::ops::Range;
 impl BeamSimd for Scalar {
     type Triangles = Lanes<8>;
     type Rays = Lanes<16>;
-    type Doubles = f64;
 
     #[inline(always)]
     unsafe fn advance(

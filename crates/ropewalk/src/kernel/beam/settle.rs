@@ -5,8 +5,7 @@
 use super::frame::{NONE, Packet, RAYS};
 use super::shaft::BeamSimd;
 use super::vector::{Doubles, Vector};
-use crate::kernel::exact::{At, Exact};
-use crate::primitive::EDGE_FILTER;
+use crate::kernel::exact::{At, Exact, meet, widen};
 use crate::wide::{ID_MASK, Lines, SIDES_BACK, SIDES_FRONT, WIDTH};
 
 /// A triangle for each lane: vertices by axis of the frame.
@@ -71,9 +70,8 @@ impl Corners {
     }
 }
 
-/// The reference test, operation by operation, where none of its special cases arises: lanes that
-/// are neither a hit nor a miss are too close to an edge, seen edge-on, or sheared along another axis
-/// than the frame's.
+/// [`meet`] for the rays of a packet and their ranges: lanes that are neither a hit nor a miss are
+/// too close to an edge, seen edge-on, or sheared along another axis than the frame's.
 ///
 /// # Safety
 /// As for [`Vector::splat`].
@@ -98,45 +96,29 @@ pub unsafe fn judge<L: BeamSimd>(
 unsafe fn judge_lanes<D: Doubles>(
     packet: &Packet,
     corners: &Corners,
-    [kx, ky, kz]: [usize; 3],
+    axis: [usize; 3],
     first: usize,
     judgement: &mut Judgement,
 ) {
     // SAFETY: passed on to the caller.
     unsafe {
-        let row = |row: &[f32; RAYS]| D::widen(&row[first..]);
-        let (zero, one) = (D::splat(0.0), D::splat(1.0));
-        let dz = row(&packet.dir[kz]);
-        let (sx, sy) = (row(&packet.dir[kx]).div(dz), row(&packet.dir[ky]).div(dz));
-        let sz = one.div(dz);
-        let [ox, oy, oz] =
-            [row(&packet.origin[kx]), row(&packet.origin[ky]), row(&packet.origin[kz])];
-        let corner = |i: usize| {
-            let z = row(&corners.0[i][2]) - oz;
-            [row(&corners.0[i][0]) - ox - sx * z, row(&corners.0[i][1]) - oy - sy * z, z]
-        };
-        let (a, b, c) = (corner(0), corner(1), corner(2));
-        // Difference and size of the two products of an edge function.
-        let edge = |p: [D; 3], q: [D; 3]| {
-            let (m, n) = (p[0] * q[1], p[1] * q[0]);
-            (m - n, m.abs() + n.abs())
-        };
-        let ((u, pu), (v, pv), (w, pw)) = (edge(c, b), edge(a, c), edge(b, a));
-        let (low, high) = (u.min(v).min(w), u.max(v).max(w));
-        let det = u + v + w;
-        let wide = (D::splat(EDGE_FILTER) * (pu + pv + pw)).le(det.abs());
-        let clear = (zero.lt(low) | high.lt(zero)) & wide;
-        let depth = (u * a[2] + v * b[2] + w * c[2]).div(det);
-        let near = a[2].min(b[2]).min(c[2]);
-        let far = a[2].max(b[2]).max(c[2]);
-        (sz * depth.max(near).min(far)).narrow(&mut judgement.t[first..]);
+        let [kx, ky, kz] = axis;
+        let (o, d) = (&packet.origin, &packet.dir);
+        let origin = widen::<D>([&o[kx], &o[ky], &o[kz]], first);
+        let dir = widen::<D>([&d[kx], &d[ky], &d[kz]], first);
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = &corners.0;
+        let a = widen::<D>([ax, ay, az], first);
+        let b = widen::<D>([bx, by, bz], first);
+        let c = widen::<D>([cx, cy, cz], first);
+        let met = meet(origin, dir, [a, b, c]);
+        met.t.narrow(&mut judgement.t[first..]);
         // The range is compared after rounding.
-        let t = row(&judgement.t);
-        let within = row(&packet.t[0]).le(t) & t.le(row(&packet.t[1]));
-        let miss = (low.lt(zero) & zero.lt(high)) | (clear & !within);
-        judgement.hit |= (clear & within) << first;
-        judgement.miss |= miss << first;
-        judgement.front |= zero.lt(det) << first;
+        let t = D::widen(&judgement.t[first..]);
+        let (t_min, t_max) = (D::widen(&packet.t[0][first..]), D::widen(&packet.t[1][first..]));
+        let within = t_min.le(t) & t.le(t_max);
+        judgement.hit |= (met.hit & within) << first;
+        judgement.miss |= (met.miss | (met.hit & !within)) << first;
+        judgement.front |= met.front << first;
     }
 }
 

@@ -6,7 +6,7 @@ use super::frame::{Frame, Packet};
 #[cfg(doc)]
 use super::settle;
 use super::settle::{Corners, Judgement, Settled};
-use super::vector::{Doubles, Vector};
+use super::vector::Vector;
 use super::{BeamQuery, Beams};
 use crate::aabb::Aabb;
 use crate::kernel::exact::Exact;
@@ -24,8 +24,6 @@ pub trait BeamSimd: Simd {
     type Triangles: Vector;
     /// One lane a ray of a packet.
     type Rays: Vector;
-    /// Some lanes of a packet, or one.
-    type Doubles: Doubles;
     /// Replaces the top of the stack by the children that some ray of the shaft may reach before
     /// `limit`, nearest on top, and returns the new stack pointer.
     ///

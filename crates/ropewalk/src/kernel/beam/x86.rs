@@ -12,7 +12,7 @@ use crate::kernel::avx2::{Avx2, COMPRESS};
 use crate::kernel::avx512::Avx512;
 use crate::kernel::exact::Exact;
 use crate::kernel::slot::STACK;
-use crate::wide::{ORDER, Treelet, WIDTH};
+use crate::wide::{AXIS_SHIFTS, ORDER, Treelet, WIDTH};
 use std::arch::x86_64::*;
 use std::ops::{Add, Mul, Range, Sub};
 
@@ -60,7 +60,8 @@ operator!(EightDoubles, Mul, mul, _mm512_mul_pd);
 
 /// The methods of a vector of doubles.
 macro_rules! doubles {
-    ($type:ident, $lanes:literal, $splat:ident, $widen:expr, $narrow:expr,
+    ($type:ident, $lanes:literal, $splat:ident,
+     $widen:ident of $load:ident, $store:ident of $narrow:ident,
      $(fn $name:ident($self:ident $(, $arg:ident: $ty:ty)*) -> $out:ty $body:block)*) => {
         impl Doubles for $type {
             const LANES: usize = $lanes;
@@ -73,13 +74,13 @@ macro_rules! doubles {
             unsafe fn widen(row: &[f32]) -> Self {
                 debug_assert!(row.len() >= $lanes);
                 // SAFETY: the caller vouches for the features and the length.
-                unsafe { $type($widen(row.as_ptr())) }
+                unsafe { $type($widen($load(row.as_ptr()))) }
             }
             #[inline(always)]
             fn narrow(self, row: &mut [f32]) {
                 let row = &mut row[..$lanes];
                 // SAFETY: values exist only where the features are; the row is long enough.
-                unsafe { $narrow(row.as_mut_ptr(), self.0) }
+                unsafe { $store(row.as_mut_ptr(), $narrow(self.0)) }
             }
             $(
                 #[inline(always)]
@@ -93,8 +94,7 @@ macro_rules! doubles {
 }
 
 doubles! { FourDoubles, 4, _mm256_set1_pd,
-    |row| _mm256_cvtps_pd(_mm_loadu_ps(row)),
-    |row, x| _mm_storeu_ps(row, _mm256_cvtpd_ps(x)),
+    _mm256_cvtps_pd of _mm_loadu_ps, _mm_storeu_ps of _mm256_cvtpd_ps,
     fn div(self, by: Self) -> Self { FourDoubles(_mm256_div_pd(self.0, by.0)) }
     fn min(self, other: Self) -> Self { FourDoubles(_mm256_min_pd(self.0, other.0)) }
     fn max(self, other: Self) -> Self { FourDoubles(_mm256_max_pd(self.0, other.0)) }
@@ -108,8 +108,7 @@ doubles! { FourDoubles, 4, _mm256_set1_pd,
 }
 
 doubles! { EightDoubles, 8, _mm512_set1_pd,
-    |row| _mm512_cvtps_pd(_mm256_loadu_ps(row)),
-    |row, x| _mm256_storeu_ps(row, _mm512_cvtpd_ps(x)),
+    _mm512_cvtps_pd of _mm256_loadu_ps, _mm256_storeu_ps of _mm512_cvtpd_ps,
     fn div(self, by: Self) -> Self { EightDoubles(_mm512_div_pd(self.0, by.0)) }
     fn min(self, other: Self) -> Self { EightDoubles(_mm512_min_pd(self.0, other.0)) }
     fn max(self, other: Self) -> Self { EightDoubles(_mm512_max_pd(self.0, other.0)) }
@@ -242,6 +241,13 @@ struct Children {
     exit: __m256,
 }
 
+/// The numbers of a row at the axes of eight planes.
+#[inline(always)]
+unsafe fn by_axis(row: &[f32; 4], axes: __m256i) -> __m256 {
+    // SAFETY: passed on to the caller; the load is of the whole row.
+    unsafe { _mm256_permutevar_ps(_mm256_broadcast_ps(&*row.as_ptr().cast::<__m128>()), axes) }
+}
+
 /// The step without its last part: masking and compressing.
 ///
 /// # Safety
@@ -259,14 +265,11 @@ unsafe fn children(
     // the table (index below 128) and the stack.
     unsafe {
         let planes = _mm256_load_ps(treelet.plane.as_ptr());
-        let shifts = _mm256_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28);
+        let shifts = _mm256_loadu_si256(AXIS_SHIFTS.as_ptr().cast());
         let axes = _mm256_srlv_epi32(_mm256_set1_epi32(treelet.axes as i32), shifts);
-        let by_axis = |row: &[f32; 4]| {
-            _mm256_permutevar_ps(_mm256_broadcast_ps(&*row.as_ptr().cast::<__m128>()), axes)
-        };
-        let (inv, inv_wide) = (by_axis(&shaft.inv), by_axis(&shaft.inv_wide));
-        let first = _mm256_sub_ps(planes, by_axis(&shaft.first));
-        let last = _mm256_sub_ps(planes, by_axis(&shaft.last));
+        let (inv, inv_wide) = (by_axis(&shaft.inv, axes), by_axis(&shaft.inv_wide, axes));
+        let first = _mm256_sub_ps(planes, by_axis(&shaft.first, axes));
+        let last = _mm256_sub_ps(planes, by_axis(&shaft.last, axes));
         // The second operand is returned where the first is NaN (0 times an infinite inverse).
         let low = _mm256_min_ps(_mm256_mul_ps(first, inv_wide), _mm256_mul_ps(first, inv));
         let high = _mm256_max_ps(_mm256_mul_ps(last, inv_wide), _mm256_mul_ps(last, inv));
@@ -299,7 +302,6 @@ unsafe fn children(
 impl BeamSimd for Avx2 {
     type Triangles = Eight;
     type Rays = Pair<Eight>;
-    type Doubles = FourDoubles;
 
     #[inline(always)]
     unsafe fn advance(
@@ -357,7 +359,6 @@ impl BeamSimd for Avx2 {
 impl BeamSimd for Avx512 {
     type Triangles = Eight;
     type Rays = Sixteen;
-    type Doubles = EightDoubles;
 
     #[inline(always)]
     unsafe fn advance(

@@ -3,28 +3,32 @@
 #![allow(unsafe_code)]
 
 use super::{BatchQuery, Clear};
-use crate::kernel::exact::{At, Exact, place};
+use crate::kernel::exact::{At, Exact, Pairs, Sheared, place};
 use crate::kernel::level::Simd;
 use crate::kernel::slot::Slot;
+use crate::kernel::wave::WAVE;
 use crate::ray::Hit;
-use crate::wide::ID_MASK;
+use crate::wide::{ID_MASK, WIDTH};
 
 /// The first hit; ties to the lowest primitive.
 pub struct Closest<'a> {
     pub(in crate::kernel) t: &'a mut [f32],
     pub(in crate::kernel) prim: &'a mut [u32],
     /// Finished rays whose hit is known but not its exact parameter, and where it lies.
-    pending: [(u32, At); PENDING],
+    pending: [(Sheared, At); 2 * PENDING],
     count: usize,
 }
 
-/// Exact parameters are worked out for so many rays at once: these do not wait for each other.
+/// Exact parameters are worked out once so many rays at least wait for them: these do not wait for
+/// each other. No more than as many again finish before that is done, since a wave is smaller.
 const PENDING: usize = 32;
+
+const _: () = assert!(WAVE <= PENDING);
 
 impl<'a> Closest<'a> {
     /// Hits go to `t`, infinite for a miss, and `prim`, `u32::MAX` for a miss.
     pub fn new(t: &'a mut [f32], prim: &'a mut [u32]) -> Self {
-        Closest { t, prim, pending: [(0, 0); PENDING], count: 0 }
+        Closest { t, prim, pending: [(Sheared::default(), 0); 2 * PENDING], count: 0 }
     }
 
     /// Finds the exact parameter of the best hit so far.
@@ -38,16 +42,30 @@ impl<'a> Closest<'a> {
         }
     }
 
+    /// Works out the exact parameters of all rays that wait for them, eight at a time.
+    ///
+    /// # Safety
+    /// As for [`BatchQuery::take_clear`].
     #[inline(always)]
-    fn settle_pending(&mut self, exact: &Exact<'_>) {
-        for &(ray, at) in &self.pending[..self.count] {
-            let hit = exact.hit(ray, at);
-            debug_assert!(hit.is_some(), "a clear hit is a hit");
-            let (t, prim) = hit.map_or((f32::INFINITY, u32::MAX), |hit| (hit.t, hit.prim_id));
-            self.t[ray as usize] = t;
-            self.prim[ray as usize] = prim;
+    unsafe fn settle_pending<L: Simd>(&mut self, exact: &Exact<'_>) {
+        let pending = &self.pending[..std::mem::take(&mut self.count)];
+        let mut pairs = [Pairs::EMPTY; 2 * PENDING / WIDTH];
+        for (i, (ray, at)) in pending.iter().enumerate() {
+            pairs[i / WIDTH].set(i, ray, exact.lines, *at);
         }
-        self.count = 0;
+        for (pairs, pending) in pairs.iter().zip(pending.chunks(WIDTH)) {
+            let mut t = [0.0; WIDTH];
+            // SAFETY: passed on to the caller.
+            let open = unsafe { pairs.meet::<L::Doubles>(&mut t) };
+            for (lane, &(Sheared { ray, .. }, at)) in pending.iter().enumerate() {
+                if open >> lane & 1 == 1 {
+                    let hit = exact.hit(ray, at);
+                    debug_assert!(hit.is_some(), "a clear hit is a hit");
+                    t[lane] = hit.map_or(f32::INFINITY, |hit| hit.t);
+                }
+                self.t[ray as usize] = t[lane];
+            }
+        }
     }
 }
 
@@ -97,11 +115,8 @@ impl BatchQuery for Closest<'_> {
         let hit = slot.best_id != u32::MAX;
         self.t[slot.ray as usize] = if hit { slot.limit } else { f32::INFINITY };
         self.prim[slot.ray as usize] = slot.best_id;
-        self.pending[self.count % PENDING] = (slot.ray, slot.best_at);
+        self.pending[self.count % (2 * PENDING)] = (Sheared::new(slot, exact.rays), slot.best_at);
         self.count += usize::from(slot.best_at != u32::MAX);
-        if self.count == PENDING {
-            self.settle_pending(exact);
-        }
     }
 
     fn miss(&mut self, index: usize) {
@@ -110,7 +125,10 @@ impl BatchQuery for Closest<'_> {
     }
 
     #[inline(always)]
-    fn end(&mut self, exact: &Exact<'_>) {
-        self.settle_pending(exact);
+    unsafe fn settle<L: Simd>(&mut self, exact: &Exact<'_>, all: bool) {
+        if self.count >= PENDING || all {
+            // SAFETY: passed on to the caller.
+            unsafe { self.settle_pending::<L>(exact) };
+        }
     }
 }

@@ -92,6 +92,7 @@ pub struct Filtered<'a, Q, F> {
 
 impl<Q: BatchQuery, F: HitFilter> BatchQuery for Filtered<'_, Q, F> {
     const ANY: bool = Q::ANY;
+    const MANY: bool = Q::MANY;
 
     #[inline(always)]
     unsafe fn take_clear<L: Simd>(
@@ -125,7 +126,8 @@ impl<Q: BatchQuery, F: HitFilter> BatchQuery for Filtered<'_, Q, F> {
     }
 
     #[inline(always)]
-    fn end(&mut self, exact: &Exact<'_>) {
-        self.query.end(exact);
+    unsafe fn settle<L: Simd>(&mut self, exact: &Exact<'_>, all: bool) {
+        // SAFETY: passed on to the caller.
+        unsafe { self.query.settle::<L>(exact, all) }
     }
 }

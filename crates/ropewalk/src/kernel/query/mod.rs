@@ -37,6 +37,9 @@ pub struct Clear<'a> {
 pub trait BatchQuery {
     /// True if the first hit ends a ray.
     const ANY: bool;
+    /// True if hits end no ray, so that blocks may well have several: they are tested in full at once
+    /// where that pays.
+    const MANY: bool = false;
 
     /// Takes hits whose exact parameters may not matter for the slot numbered `k`; the lanes for which
     /// they do are returned and come again by [`BatchQuery::take`].
@@ -57,9 +60,14 @@ pub trait BatchQuery {
     /// The ray of slot `k` has seen every cell that matters.
     fn finish(&mut self, k: usize, slot: &mut Slot, exact: &Exact<'_>);
 
-    /// Ray `index` misses the scene's box or is invalid.
+    /// Ray `index` hits nothing, unless [`BatchQuery::finish`] says otherwise later on.
     fn miss(&mut self, index: usize);
 
-    /// No more rays come.
-    fn end(&mut self, _exact: &Exact<'_>) {}
+    /// Some rays have finished, or all: answers that were put off may be worked out now, in the latter
+    /// case they must be.
+    ///
+    /// # Safety
+    /// As for [`BatchQuery::take_clear`].
+    #[inline(always)]
+    unsafe fn settle<L: Simd>(&mut self, _exact: &Exact<'_>, _all: bool) {}
 }

@@ -1,0 +1,113 @@
+//! The tests of a leaf's blocks, for a ray of the wave or a ray by itself.
+
+#![allow(unsafe_code)]
+
+use super::events::Events;
+use super::exact::{Exact, place};
+use super::level::{Found, Range, Simd};
+use super::query::{BatchQuery, Clear};
+use super::slot::Slot;
+use crate::geometry::Geometry;
+use crate::ray::PreparedRay;
+use crate::wide::{Block, ID_MASK, LINE, WIDTH, WideTree};
+
+/// What a leaf is tested with besides the ray.
+#[derive(Clone, Copy)]
+pub struct Leaves<'a> {
+    /// The tree.
+    pub tree: &'a WideTree,
+    /// What it was built over.
+    pub geometry: &'a Geometry,
+    /// Triangles and rays for exact tests.
+    pub exact: Exact<'a>,
+}
+
+impl Leaves<'_> {
+    #[inline(always)]
+    unsafe fn block(&self, line: usize) -> &Block {
+        // SAFETY: the caller vouches for the line.
+        unsafe { &*self.tree.lines().as_ptr().add(line * LINE).cast::<Block>() }
+    }
+
+    /// The lanes of a block that the ray of a slot may hit: triangles in bits 7..0, others in
+    /// bits 15..8.
+    ///
+    /// # Safety
+    /// The machine must have the features of `L`, and the caller must enable them; a block of the tree
+    /// must begin at `line`.
+    #[inline(always)]
+    pub unsafe fn meet<L: Simd, const SHAPES: bool>(&self, slot: &Slot, line: usize) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            let block = self.block(line);
+            let lanes = L::meets(slot, block);
+            if SHAPES { lanes | block.shape_lanes() << WIDTH } else { lanes }
+        }
+    }
+
+    /// Tests a block that the ray of slot `k` meets in `lanes`; the lanes that need a decision in `f64`,
+    /// and whether any triangle is hit or may be.
+    ///
+    /// No branches: which blocks hold a hit cannot be predicted, and a wrong guess would cost more
+    /// than a test.
+    ///
+    /// # Safety
+    /// As for [`Leaves::meet`].
+    #[inline(always)]
+    pub unsafe fn test<L: Simd, Q: BatchQuery, E: Events>(
+        &self,
+        (k, slot): (u32, &mut Slot),
+        line: usize,
+        lanes: u32,
+        query: &mut Q,
+        events: &mut E,
+    ) -> (u32, bool) {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            let block = self.block(line);
+            let mut range = Range::default();
+            let Found { clear, open } = L::test(slot, block, &mut range);
+            events.found(clear, open);
+            let hits = Clear { lanes: clear, range: &range, block, line };
+            let unclear = query.take_clear::<L>(k as usize, slot, &hits, &self.exact);
+            (open | unclear | lanes >> WIDTH << WIDTH, clear | open != 0)
+        }
+    }
+
+    /// Decides the lanes of a block exactly: triangles in bits 7..0, others in bits 15..8.
+    #[cold]
+    pub fn decide<Q: BatchQuery>(
+        &self,
+        (k, slot): (u32, &mut Slot),
+        line: usize,
+        mut lanes: u32,
+        query: &mut Q,
+    ) {
+        if lanes >> WIDTH != 0 {
+            self.test_shapes((k, &mut *slot), line, query);
+            lanes &= (1 << WIDTH) - 1;
+        }
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            if let Some(hit) = self.exact.hit(slot.ray, place(line, lane)) {
+                query.take(k as usize, slot, &hit, &self.exact);
+            }
+            lanes &= lanes - 1;
+        }
+    }
+
+    /// Tests the primitives of a block that are no triangles.
+    fn test_shapes<Q: BatchQuery>(&self, (k, slot): (u32, &mut Slot), line: usize, query: &mut Q) {
+        let block = self.tree.lines().block(line);
+        // `load` has refused what cannot be prepared.
+        let Some(ray) = PreparedRay::new(&self.exact.rays[slot.ray as usize]) else { return };
+        let mut lanes = block.shape_lanes();
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize & (WIDTH - 1);
+            lanes &= lanes - 1;
+            if let Some(hit) = self.geometry.intersect(block.id[lane] & ID_MASK, &ray) {
+                query.take(k as usize, slot, &hit, &self.exact);
+            }
+        }
+    }
+}
