@@ -5,6 +5,7 @@ use crate::output::usage;
 use anyhow::Context;
 use ropewalk::build::{self, BuildError, BuildReport, BuildSettings, Termination};
 use ropewalk::method::Method;
+use ropewalk::wide::WideTree;
 use ropewalk::{Accelerator, Geometry};
 use ropewalk_scene::{FacetPolicy, NffLimits, Scene, load_scene};
 use std::sync::Arc;
@@ -52,6 +53,21 @@ pub struct Engine {
     pub accelerator: Accelerator,
     pub report: Option<BuildReport>,
     pub build_seconds: f64,
+}
+
+/// Builds a wide tree; it and the seconds that it took.
+pub fn build_wide(
+    geometry: &Geometry,
+    settings: &BuildSettings,
+) -> anyhow::Result<(WideTree, f64)> {
+    let bar = interrupt::bar(1000, "build");
+    let watch = Watch { cancel: interrupt::flag(), bar: &bar };
+    let built = WideTree::build(geometry, settings, &watch);
+    bar.finish_and_clear();
+    match built {
+        Err(BuildError::Cancelled) => Err(interrupt::interrupted()),
+        other => other.map(|(tree, report)| (tree, report.seconds)).map_err(Into::into),
+    }
 }
 
 /// Builds the tree, and the ropes if the method walks them.

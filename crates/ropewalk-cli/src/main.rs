@@ -29,6 +29,8 @@ enum Command {
     Stats(command::stats::Args),
     /// Check every invariant of a scene's tree, ropes and rope trees
     Validate(command::validate::Args),
+    /// Measure rays per second of the batch kernels on a scene
+    Bench(command::bench::Args),
     /// Run the experiment of the 1997 paper and write its report
     Paper(paper::Args),
 }
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
         Command::Scene(args) => command::scene::run(&args),
         Command::Stats(args) => command::stats::run(&args),
         Command::Validate(args) => command::validate::run(&args),
+        Command::Bench(args) => command::bench::run(&args),
         Command::Paper(args) => paper::run(&args),
     };
     match result {

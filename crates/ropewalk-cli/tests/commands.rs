@@ -99,6 +99,46 @@ fn two_sided_surfaces_are_hit_from_behind() {
 }
 
 #[test]
+fn bench_measures_every_workload() {
+    let folder = tempfile::tempdir().unwrap();
+    let names =
+        ["primary", "diffuse", "shadow", "ao", "all-hits", "first-8", "walk-1%", "walk-0.2%"];
+    let list = names.join(",");
+    for scene in ["spd:tetra:3", "spd:balls:1"] {
+        let args =
+            ["bench", scene, "--side", "16", "--rounds", "2", "--workloads", &list, "--json"];
+        let output = ropewalk(folder.path(), &[&args[..], &["--preset", "compact"]].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        has_numbers(&json, "seconds", &["read", "build"]);
+        assert_eq!((&json["preset"], &json["rounds"]), (&"compact".into(), &2.into()));
+        assert!(json["bytes_per_primitive"].as_f64().unwrap() > 40.0);
+        let workloads = json["workloads"].as_array().unwrap();
+        for (workload, name) in workloads.iter().zip(names) {
+            assert_eq!(workload["name"], name);
+            assert!(workload["rays"].as_u64().unwrap() > 0 && workload["median_mrays"].is_number());
+            assert_eq!(workload["per_ray"]["steps"].is_number(), name != "first-8", "{workload}");
+        }
+        assert_eq!((workloads.len(), &workloads[0]["rays"]), (names.len(), &256.into()));
+    }
+    let args = ["bench", "spd:tetra:2", "--side", "8", "--threads", "1", "--level", "scalar"];
+    let output = ropewalk(folder.path(), &args);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success() && text.contains("scalar, 1 thread(s)"), "{text}");
+    assert!(files(folder.path()).is_empty());
+}
+
+#[test]
+fn a_scene_without_a_view_is_seen_from_outside() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.nff"), "s 0 0 0 1\n").unwrap();
+    let output = ropewalk(folder.path(), &["bench", "a.nff", "--side", "16", "--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert!(json["workloads"][2]["rays"].as_u64().unwrap() > 0, "{json}");
+}
+
+#[test]
 fn scene_writes_what_stats_and_validate_read() {
     let folder = tempfile::tempdir().unwrap();
     let output = ropewalk(folder.path(), &["scene", "mount", "--size", "3", "-o", "m.nff"]);
@@ -140,7 +180,7 @@ fn the_inputs_fault_is_exit_code_1_and_one_sentence() {
     ];
     let before = files(folder.path());
     for (scene, sentence) in cases {
-        for command in ["render", "stats", "validate"] {
+        for command in ["render", "stats", "validate", "bench"] {
             let output = ropewalk(folder.path(), &[command, scene]);
             let text = stderr(&output);
             assert_eq!(output.status.code(), Some(1), "{command} {scene}: {text}");
@@ -154,13 +194,19 @@ fn the_inputs_fault_is_exit_code_1_and_one_sentence() {
 #[test]
 fn a_wrong_use_is_exit_code_2() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [&[&str]; 7] = [
+    let cases: [&[&str]; 13] = [
         &["render"],
         &["render", "spd:tetra:2", "--method", "magic"],
         &["render", "spd:tetra:2", "--size", "0x10"],
         &["render", "spd:tetra:2", "--aov", "heat"],
         &["scene", "cubes"],
         &["scene", "tetra", "--size", "99"],
+        &["bench"],
+        &["bench", "spd:tetra:2", "--workloads", "primary,build"],
+        &["bench", "spd:tetra:2", "--preset", "worst"],
+        &["bench", "spd:tetra:2", "--level", "avx1024"],
+        &["bench", "spd:tetra:2", "--side", "100"],
+        &["bench", "spd:tetra:2", "--rounds", "0"],
         &["paint"],
     ];
     for args in cases {

@@ -5,7 +5,7 @@ use clap::Parser;
 use ropewalk_bench::answer::BenchHit;
 use ropewalk_bench::harness::{
     Answers, Budget, Builder, Engine, Family, Oracle, Record, Row, Testimony, build_rates,
-    calibrate, chart, cpu_name, max_wrong_per_million, rates, summary, verify,
+    calibrate, chart, commit, cpu_name, max_wrong_per_million, rates, summary, today, verify,
 };
 use ropewalk_bench::own::{Single, TaB, TaBBuilder, Wave, WaveBuilder};
 use ropewalk_bench::peer::{
@@ -33,6 +33,15 @@ struct Arguments {
     /// Rounds of each engine.
     #[arg(long)]
     rounds: Option<usize>,
+    /// Seconds of a round; an engine that needs longer gets a subset of the rays.
+    #[arg(long)]
+    seconds: Option<f64>,
+    /// The same for peers other than Embree.
+    #[arg(long)]
+    peer_seconds: Option<f64>,
+    /// Seconds of all builds of an engine on a scene; three are made in any case.
+    #[arg(long)]
+    build_seconds: Option<f64>,
     /// Fewer rays and rounds, for trying out; the record goes to target/bench-quick.
     #[arg(long)]
     quick: bool,
@@ -148,7 +157,7 @@ fn pictures(
         let tree = Arc::new(EmbreeScene::build(&plan.device, &scene.mesh, quality)?);
         let engine = EmbreeEngine::new(&tree, Call::Single);
         let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engine.closest(rays, out);
-        let grey = Generator::new(&scene, plan.sizes, &trace).picture();
+        let grey = Generator::new(&scene.mesh, &scene.view, plan.sizes, &trace).picture();
         let mut file = format!("P5 {0} {0} 255\n", plan.sizes.side).into_bytes();
         file.extend(grey);
         std::fs::write(folder.join(format!("{}.pgm", entry.name)), file)?;
@@ -180,30 +189,22 @@ fn plan(arguments: &Arguments) -> anyhow::Result<Plan> {
         if arguments.quick { (Budget::QUICK, Sizes::QUICK) } else { (Budget::FULL, Sizes::FULL) };
     budget.rounds = arguments.rounds.unwrap_or(budget.rounds);
     anyhow::ensure!(budget.rounds > 0, "at least one round is needed");
+    for (own, given) in [
+        (&mut budget.seconds_per_round, arguments.seconds),
+        (&mut budget.peer_seconds, arguments.peer_seconds),
+        (&mut budget.build_seconds, arguments.build_seconds),
+    ] {
+        *own = given.unwrap_or(*own);
+        anyhow::ensure!(*own > 0.0, "seconds: expected a number above 0, found {own}");
+    }
     let library = match &arguments.embree {
         Some(path) => path.clone(),
-        None => find_embree(Path::new(".venv-bench"))
+        None => Embree::find(Path::new(".venv-bench"))
             .context("no libembree4 found below .venv-bench; scripts/bench installs it")?,
     };
     let device = Embree::load(&library, 1)?;
     let engines = arguments.engines.clone();
     Ok(Plan { kinds, engines, threads, budget, sizes, library, device })
-}
-
-/// The library inside the package that scripts/bench installs.
-fn find_embree(below: &Path) -> Option<PathBuf> {
-    for entry in std::fs::read_dir(below).ok()?.flatten() {
-        let (path, name) = (entry.path(), entry.file_name());
-        if name.to_string_lossy().starts_with("libembree4") {
-            return Some(path);
-        }
-        if entry.file_type().is_ok_and(|t| t.is_dir())
-            && let Some(found) = find_embree(&path)
-        {
-            return Some(found);
-        }
-    }
-    None
 }
 
 fn run_scene(plan: &Plan, scene: &Scene, record: &mut Record) -> anyhow::Result<()> {
@@ -215,7 +216,7 @@ fn run_scene(plan: &Plan, scene: &Scene, record: &mut Record) -> anyhow::Result<
         let engines = engines(plan, mesh, filters)?;
         let tracer = &engines[0];
         let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| tracer.closest(rays, out);
-        let generator = Generator::new(scene, plan.sizes, &trace);
+        let generator = Generator::new(&scene.mesh, &scene.view, plan.sizes, &trace);
         for kind in traced {
             run_workload(plan, mesh, &generator.workload(kind), &engines, record)?;
         }
@@ -417,32 +418,4 @@ fn report(record: &Record, count: usize) {
             row.error
         );
     }
-}
-
-/// The short hash of the checked-out commit, with `+` if the work tree differs from it.
-fn commit() -> String {
-    let git = |arguments: &[&str]| {
-        let output = std::process::Command::new("git").args(arguments).output().ok()?;
-        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
-    let Some(hash) = git(&["rev-parse", "--short", "HEAD"]) else { return "unknown".into() };
-    let clean = git(&["status", "--porcelain", "-uno"]).is_some_and(|s| s.is_empty());
-    format!("{hash}{}", if clean { "" } else { "+" })
-}
-
-/// Today's date (UTC), `YYYY-MM-DD`.
-fn today() -> String {
-    let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH);
-    let days = now.map_or(0, |d| d.as_secs() / 86_400) as i64;
-    // Hinnant's civil_from_days, for dates after 1970: years begin in March.
-    let z = days + 719_468;
-    let (era, day_of_era) = (z / 146_097, z % 146_097);
-    let year_of_era =
-        (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let shifted = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
-    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
-    let year = year_of_era + era * 400 + i64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02}")
 }

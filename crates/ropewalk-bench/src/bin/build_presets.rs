@@ -4,14 +4,13 @@
 use anyhow::Context;
 use clap::Parser;
 use ropewalk::Geometry;
-use ropewalk::Sides;
 use ropewalk::build::{BuildSettings, Preset, build};
 use ropewalk::cost::LeafCost;
-use ropewalk::primitive::Triangle;
 use ropewalk::tree::{BspTree, NodeKind};
 use ropewalk::wide::{Treelet, WideTree};
-use ropewalk_bench::harness::{Clock, Spread};
-use ropewalk_bench::scene::{Catalog, Mesh};
+use ropewalk_bench::harness::{Clock, Spread, peak_resident};
+use ropewalk_bench::own::geometry;
+use ropewalk_bench::scene::Catalog;
 use std::path::PathBuf;
 
 /// Prints one CSV row a scene and preset.
@@ -38,6 +37,9 @@ struct Arguments {
     /// Overrides the price of memory.
     #[arg(long)]
     size_cost: Option<f64>,
+    /// Overrides the largest price of memory to a ray that hits the node.
+    #[arg(long)]
+    max_size_price: Option<f64>,
     /// Overrides the duplication limit.
     #[arg(long)]
     max_duplication: Option<f64>,
@@ -88,6 +90,7 @@ fn entries(arguments: &Arguments) -> anyhow::Result<Vec<Entry>> {
             BuildSettings { threads: arguments.threads, ..BuildSettings::preset(preset) };
         settings.traversal_cost = arguments.traversal_cost.unwrap_or(settings.traversal_cost);
         settings.size_cost = arguments.size_cost.unwrap_or(settings.size_cost);
+        settings.max_size_price = arguments.max_size_price.unwrap_or(settings.max_size_price);
         settings.max_duplication = arguments.max_duplication.unwrap_or(settings.max_duplication);
         if preset == Preset::Balanced {
             settings.binned_from = arguments.binned_from.unwrap_or(settings.binned_from);
@@ -95,16 +98,8 @@ fn entries(arguments: &Arguments) -> anyhow::Result<Vec<Entry>> {
         Entry { name: preset.name(), settings, seconds: Vec::new(), last: None }
     };
     let entries: Vec<Entry> = Preset::ALL.into_iter().filter(wanted).map(entry).collect();
-    anyhow::ensure!(!entries.is_empty(), "the presets are fast, balanced and best");
+    anyhow::ensure!(!entries.is_empty(), "the presets are fast, balanced, best and compact");
     Ok(entries)
-}
-
-fn geometry(mesh: &Mesh) -> anyhow::Result<Geometry> {
-    let mut geometry = Geometry::new();
-    for face in 0..mesh.faces.len() as u32 {
-        geometry.push(Triangle { vertices: mesh.triangle(face) }, Sides::Both)?;
-    }
-    Ok(geometry)
 }
 
 impl Entry {
@@ -142,7 +137,7 @@ impl Entry {
             treelet_bytes as f64 / wide.bytes() as f64,
             planes,
             predicted_cost(tree, &BuildSettings::preset(Preset::Best)),
-            peak_mib().unwrap_or(0),
+            peak_resident().unwrap_or(0) >> 20,
         );
         Ok(())
     }
@@ -160,11 +155,4 @@ fn predicted_cost(tree: &BspTree, settings: &BuildSettings) -> f64 {
             };
     });
     cost
-}
-
-/// Peak resident set of this process, where Linux tells it.
-fn peak_mib() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? / 1024)
 }

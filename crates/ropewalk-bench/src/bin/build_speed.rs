@@ -7,6 +7,7 @@
 
 use ropewalk::Geometry;
 use ropewalk::build::{BuildSettings, Measure, build};
+use ropewalk_bench::harness::peak_resident;
 use ropewalk_bench::scenes::{grid_mesh, random_soup};
 use std::process::ExitCode;
 
@@ -58,7 +59,7 @@ fn row(
         report.seconds,
         n / cpu * 1e-6,
         cpu * 1e9 / (n * n.log2()),
-        peak_mib().map_or("unknown".into(), |m| m.to_string()),
+        peak_resident().map_or("unknown".into(), |bytes| (bytes >> 20).to_string()),
         report.tree.inner_nodes,
         report.tree.leaves,
         report.tree.references,
@@ -72,11 +73,4 @@ fn row(
 fn thread_cpu_seconds() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
     Some(stat.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
-}
-
-/// Peak resident set of this process, where Linux tells it.
-fn peak_mib() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? / 1024)
 }

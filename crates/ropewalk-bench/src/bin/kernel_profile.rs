@@ -1,14 +1,16 @@
 //! Nanoseconds and counted events per ray of the batch kernels, without peers.
 //!
-//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START]`, names separated by commas;
-//! START is `automatic`, `root` or `entry`, or `single` for one call a ray.
+//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START] [PRESETS]`, names separated by commas;
+//! START is `automatic`, `root` or `entry`, or `single` for one call a ray. Rounds of the presets are
+//! interleaved.
 //!
 //! With the environment variable `PLAIN_CLOCK` time is taken from the wall clock, as Valgrind needs it.
 
 use anyhow::Context;
+use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::kernel::{AllHits, BatchCaster, Level, Start};
 use ropewalk_bench::answer::BenchHit;
-use ropewalk_bench::harness::{Clock, Engine};
+use ropewalk_bench::harness::{Clock, Engine, Spread};
 use ropewalk_bench::own::Wave;
 use ropewalk_bench::scene::Catalog;
 use ropewalk_bench::workload::{Generator, Kind, Question, Sizes};
@@ -34,12 +36,17 @@ fn main() -> anyhow::Result<()> {
         name => anyhow::bail!("no start {name}"),
     };
     let single = arguments.get(4).is_some_and(|name| name == "single");
+    let presets = match list(5) {
+        names if names.is_empty() => vec![Preset::Balanced],
+        names => names.iter().map(|name| preset(name)).collect::<anyhow::Result<_>>()?,
+    };
     let catalog =
         Catalog { data: PathBuf::from("../shared/data"), generated: "target/bench-scenes".into() };
     println!(
-        "{:12} {:9} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
+        "{:12} {:9} {:8} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
         "scene",
         "workload",
+        "preset",
         "Mrays/s",
         "ns/ray",
         "skip",
@@ -53,39 +60,54 @@ fn main() -> anyhow::Result<()> {
     );
     for entry in Catalog::select(&list(0))? {
         let scene = catalog.load(&entry)?;
-        let engine = Wave::build(&scene.mesh, 1)?;
-        let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engine.closest(rays, out);
+        let build = |&preset: &Preset| {
+            let settings = BuildSettings { threads: 1, ..BuildSettings::preset(preset) };
+            Wave::with_settings(&scene.mesh, &settings)
+        };
+        let engines: Vec<Wave> = presets.iter().map(build).collect::<anyhow::Result<_>>()?;
+        let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engines[0].closest(rays, out);
         let sizes = Sizes { side: 512, chords: 16_384, walk: 1 << 18 };
-        let generator = Generator::new(&scene, sizes, &trace);
+        let generator = Generator::new(&scene.mesh, &scene.view, sizes, &trace);
         for name in list(1) {
             let kind = Kind::named(&name).with_context(|| format!("no workload {name}"))?;
             let rays = generator.workload(kind).rays;
-            let caster = engine.caster().with_level(level).context("level not available")?;
-            let caster = caster.with_start(start);
-            let ns = time(&caster, kind.question(), &rays, rounds, single);
-            let events = match kind.question() {
-                Question::Occluded => caster.occluded_events(&rays),
-                Question::AllHits => caster.all_hits_events(&rays),
-                _ => caster.closest_hit_events(&rays),
+            let caster = |engine| {
+                let caster = Wave::caster(engine).with_level(level).context("level not available");
+                caster.map(|c| c.with_start(start))
             };
-            let n = rays.len() as f64;
-            let per = |count: u64| count as f64 / n;
-            println!(
-                "{:12} {name:9} {:7.2} {ns:7.1} {:6.3} {:6.2} {:6.2} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
-                entry.name,
-                1e3 / ns,
-                per(events.skipped),
-                per(events.looked),
-                per(events.boxed),
-                per(events.steps),
-                per(events.leaves),
-                per(events.blocks),
-                per(events.clear),
-                per(events.open)
-            );
+            let casters: Vec<_> = engines.iter().map(caster).collect::<anyhow::Result<_>>()?;
+            let times = time(&casters, kind.question(), &rays, rounds, single);
+            for ((caster, ns), preset) in casters.iter().zip(times).zip(&presets) {
+                let events = match kind.question() {
+                    Question::Occluded => caster.occluded_events(&rays),
+                    Question::AllHits => caster.all_hits_events(&rays),
+                    _ => caster.closest_hit_events(&rays),
+                };
+                let n = rays.len() as f64;
+                let per = |count: u64| count as f64 / n;
+                println!(
+                    "{:12} {name:9} {:8} {:7.2} {ns:7.1} {:6.3} {:6.2} {:6.2} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
+                    entry.name,
+                    preset.name(),
+                    1e3 / ns,
+                    per(events.skipped),
+                    per(events.looked),
+                    per(events.boxed),
+                    per(events.steps),
+                    per(events.leaves),
+                    per(events.blocks),
+                    per(events.clear),
+                    per(events.open)
+                );
+            }
         }
     }
     Ok(())
+}
+
+fn preset(name: &str) -> anyhow::Result<Preset> {
+    let found = Preset::ALL.into_iter().find(|p| p.name() == name);
+    found.with_context(|| format!("no preset {name}"))
 }
 
 /// Thread CPU time, or wall time where the other cannot be had.
@@ -111,20 +133,22 @@ impl Stopwatch {
     }
 }
 
-/// Median nanoseconds of thread CPU time a ray.
+/// Median nanoseconds of thread CPU time a ray, for each caster.
 fn time(
-    caster: &BatchCaster<'_>,
+    casters: &[BatchCaster<'_>],
     question: Question,
     rays: &[ropewalk::Ray],
     rounds: usize,
     single: bool,
-) -> f64 {
+) -> Vec<f64> {
     let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
     let mut hit = vec![false; rays.len()];
     let mut all_hits = AllHits::default();
-    let mut all: Vec<f64> = (0..rounds)
-        .map(|_| {
-            let clock = Stopwatch::start();
+    let mut samples = vec![Vec::new(); casters.len()];
+    for round in 0..rounds {
+        for i in 0..casters.len() {
+            let at = (i + round) % casters.len();
+            let (caster, clock) = (&casters[at], Stopwatch::start());
             match question {
                 Question::Occluded if single => {
                     for (ray, hit) in rays.iter().zip(&mut hit) {
@@ -145,9 +169,8 @@ fn time(
                     caster.closest_hit_into(rays, &mut t, &mut prim);
                 }
             }
-            clock.seconds() * 1e9 / rays.len() as f64
-        })
-        .collect();
-    all.sort_by(f64::total_cmp);
-    all[rounds / 2]
+            samples[at].push(clock.seconds() * 1e9 / rays.len() as f64);
+        }
+    }
+    samples.iter().filter_map(|s| Spread::of(s)).map(|s| s.median).collect()
 }

@@ -7,5 +7,5 @@
 mod ta_b;
 mod wave;
 
-pub use ta_b::{TaB, TaBBuilder};
+pub use ta_b::{TaB, TaBBuilder, geometry};
 pub use wave::{Single, Wave, WaveBuilder};

@@ -45,7 +45,11 @@ impl TaB {
     }
 }
 
-pub(super) fn geometry(mesh: &Mesh) -> anyhow::Result<Geometry> {
+/// The triangles of a mesh, face `i` as primitive `i`, hit on both sides.
+///
+/// # Errors
+/// What [`Geometry::push`] says.
+pub fn geometry(mesh: &Mesh) -> anyhow::Result<Geometry> {
     let mut geometry = Geometry::new();
     for face in 0..mesh.faces.len() as u32 {
         geometry.push(Triangle { vertices: mesh.triangle(face) }, Sides::Both)?;

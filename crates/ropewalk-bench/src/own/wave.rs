@@ -30,12 +30,29 @@ impl Wave {
     /// # Errors
     /// What the builder or the compiler says.
     pub fn build(mesh: &Mesh, threads: usize) -> anyhow::Result<Self> {
-        Self::over(geometry(mesh)?, threads)
+        Self::with_settings(mesh, &settings(threads))
     }
 
-    fn over(geometry: Geometry, threads: usize) -> anyhow::Result<Self> {
-        let (tree, _) = WideTree::build(&geometry, &settings(threads), &())?;
+    /// Builds a tree with these settings.
+    ///
+    /// # Errors
+    /// What the builder or the compiler says.
+    pub fn with_settings(mesh: &Mesh, settings: &BuildSettings) -> anyhow::Result<Self> {
+        Self::over(geometry(mesh)?, settings)
+    }
+
+    /// Builds a tree over primitives.
+    ///
+    /// # Errors
+    /// What the builder or the compiler says.
+    pub fn over(geometry: Geometry, settings: &BuildSettings) -> anyhow::Result<Self> {
+        let (tree, _) = WideTree::build(&geometry, settings, &())?;
         Ok(Wave { geometry: Arc::new(geometry), tree: Arc::new(tree) })
+    }
+
+    /// Bytes of the tree, its own triangles included.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes()
     }
 
     /// The caster on one thread.
@@ -144,9 +161,9 @@ impl Builder for WaveBuilder<'_> {
     fn build(&self, threads: usize) -> anyhow::Result<Built> {
         let geometry = geometry(self.0)?;
         let clock = Clock::start();
-        let built = Wave::over(geometry, threads)?;
+        let built = Wave::over(geometry, &settings(threads))?;
         let (cpu, wall_seconds) = clock.elapsed();
         let seconds = if threads == 1 { cpu } else { wall_seconds };
-        Ok(Built { seconds, wall_seconds, bytes: Some(built.tree.bytes()) })
+        Ok(Built { seconds, wall_seconds, bytes: Some(built.bytes()) })
     }
 }

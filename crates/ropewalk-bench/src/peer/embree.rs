@@ -12,7 +12,7 @@ use anyhow::Context;
 use libloading::Library;
 use ropewalk::Ray;
 use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::ptr::null_mut;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
@@ -240,6 +240,22 @@ unsafe impl Send for Embree {}
 unsafe impl Sync for Embree {}
 
 impl Embree {
+    /// The library somewhere below a folder, such as that of the package scripts/bench installs.
+    pub fn find(below: &Path) -> Option<PathBuf> {
+        for entry in std::fs::read_dir(below).ok()?.flatten() {
+            let (path, name) = (entry.path(), entry.file_name());
+            if name.to_string_lossy().starts_with("libembree4") {
+                return Some(path);
+            }
+            if entry.file_type().is_ok_and(|t| t.is_dir())
+                && let Some(found) = Self::find(&path)
+            {
+                return Some(found);
+            }
+        }
+        None
+    }
+
     /// Loads the library and opens a device that builds with `threads` threads.
     ///
     /// With one thread the process is pinned to one CPU while the device is opened: its worker

@@ -1,7 +1,8 @@
 //! The scenes of the benchmark, none of which may be left out of a full run.
 
-use super::mesh::{Mesh, MeshError, Scene, View};
+use super::mesh::{Mesh, MeshError, Scene};
 use super::spd::tessellate;
+use crate::workload::View;
 use anyhow::Context;
 use ropewalk_scene::spd::Spd;
 use std::path::PathBuf;

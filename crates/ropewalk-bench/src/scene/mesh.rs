@@ -1,8 +1,9 @@
 //! A triangle mesh with a view, and its reader for PLY and GLB files, gzipped or plain.
 
 use super::{glb, ply};
+use crate::workload::{Surface, View, triangle_normal};
 use flate2::read::GzDecoder;
-use ropewalk::Aabb;
+use ropewalk::{Aabb, Ray};
 use std::io::Read;
 use std::path::Path;
 
@@ -16,21 +17,6 @@ pub struct Mesh {
     pub vertices: Vec<[f32; 3]>,
     /// Three vertex indices a triangle.
     pub faces: Vec<[u32; 3]>,
-}
-
-/// From where a scene is seen, and where its light stands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// Eye point.
-    pub eye: [f32; 3],
-    /// Point looked at.
-    pub at: [f32; 3],
-    /// Up direction; any direction that is not parallel to the view.
-    pub up: [f32; 3],
-    /// Full view angle in degrees; the picture is square.
-    pub fov_degrees: f32,
-    /// Point light for shadow rays.
-    pub light: [f32; 3],
 }
 
 /// A mesh and its view.
@@ -103,10 +89,51 @@ impl Mesh {
         self.faces[face as usize].map(|v| self.vertices[v as usize])
     }
 
+    /// True if the surface has no rim: each edge has as many faces on its one side as on the other,
+    /// vertices at the same place counted as one.
+    pub fn is_closed(&self) -> bool {
+        let mut places: Vec<[u32; 3]> = self.vertices.iter().map(place).collect();
+        places.sort_unstable();
+        places.dedup();
+        let id = |v: u32| {
+            let place = place(&self.vertices[v as usize]);
+            places.partition_point(|p| *p < place) as u32
+        };
+        let mut edges = Vec::with_capacity(3 * self.faces.len());
+        for face in &self.faces {
+            let [a, b, c] = face.map(id);
+            edges.extend(
+                [(a, b), (b, c), (c, a)]
+                    .into_iter()
+                    .filter(|(from, to)| from != to)
+                    .map(|(from, to)| if from < to { (from, to, 1i8) } else { (to, from, -1) }),
+            );
+        }
+        edges.sort_unstable();
+        edges
+            .chunk_by(|x, y| (x.0, x.1) == (y.0, y.1))
+            .all(|uses| uses.iter().map(|e| i64::from(e.2)).sum::<i64>() == 0)
+    }
+
     /// The box of all vertices that a face uses.
     pub fn bounds(&self) -> Aabb {
         Aabb::from_points(self.faces.iter().flatten().map(|&v| self.vertices[v as usize]))
     }
+}
+
+impl Surface for Mesh {
+    fn bounds(&self) -> Aabb {
+        Mesh::bounds(self)
+    }
+
+    fn facing_normal(&self, prim: u32, ray: &Ray) -> Option<[f64; 3]> {
+        triangle_normal(self.triangle(prim), ray)
+    }
+}
+
+/// A position as something that can be sorted; -0 is 0.
+fn place(vertex: &[f32; 3]) -> [u32; 3] {
+    vertex.map(|x| (x + 0.0).to_bits())
 }
 
 #[cfg(test)]

@@ -6,5 +6,6 @@ mod mesh;
 mod ply;
 mod spd;
 
+pub use crate::workload::View;
 pub use catalog::{Catalog, SceneEntry};
-pub use mesh::{Mesh, MeshError, Scene, View};
+pub use mesh::{Mesh, MeshError, Scene};

@@ -1,6 +1,7 @@
 //! Scenes of the Standard Procedural Databases as triangles.
 
-use super::mesh::{Mesh, MeshError, Scene, View};
+use super::mesh::{Mesh, MeshError, Scene};
+use crate::workload::View;
 use anyhow::Context;
 use ropewalk_scene::spd::{Spd, generate};
 use ropewalk_scene::{Camera, Surface};

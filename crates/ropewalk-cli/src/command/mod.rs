@@ -1,5 +1,6 @@
 //! One file a subcommand.
 
+pub mod bench;
 pub mod render;
 pub mod scene;
 pub mod stats;

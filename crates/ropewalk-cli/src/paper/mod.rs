@@ -17,7 +17,7 @@ mod sample;
 mod scaling;
 mod scenes;
 mod sensitivity;
-mod statistics;
+pub mod statistics;
 mod table;
 mod verdict;
 

@@ -161,6 +161,7 @@ fn build_output(
         empty_factor: settings.empty_factor,
         size_unit: settings.size_cost * geometry.bounds().area()
             / settings.leaf_cost.cost(geometry.len()).max(1.0),
+        max_size_price: settings.max_size_price,
     };
     let search = plane_search(settings, pricing, blockage);
     let fragment = |prim| Fragment::new(prim, &geometry.shape(prim).bounds());

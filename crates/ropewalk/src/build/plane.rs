@@ -146,10 +146,6 @@ impl CellAreas {
     }
 }
 
-/// Largest price of one more unit of leaf cost to a ray that hits the node. Without it, detail that is
-/// small in a large scene would not be worth its memory, although somebody may look at nothing else.
-const MAX_SIZE_PRICE: f64 = 0.8;
-
 /// The constants of the cost of a plane.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pricing {
@@ -158,13 +154,15 @@ pub(crate) struct Pricing {
     pub empty_factor: f64,
     /// Price of one more unit of leaf cost anywhere in the tree, times the area of the root.
     pub size_unit: f64,
+    /// Largest price of one more unit of leaf cost to a ray that hits the node.
+    pub max_size_price: f64,
 }
 
 impl Pricing {
     /// Price of one more unit of leaf cost in the children than in the node, to a ray that hits it.
     #[inline]
     pub fn size_price(&self, areas: &CellAreas) -> f64 {
-        (self.size_unit / areas.area).min(MAX_SIZE_PRICE)
+        (self.size_unit / areas.area).min(self.max_size_price)
     }
 
     /// `traversal_cost + measure`, the measure times `empty_factor` if a side is empty, and the

@@ -114,11 +114,13 @@ pub enum Preset {
     Balanced,
     /// The exact sweep everywhere.
     Best,
+    /// As balanced, with a high price of memory: for scenes that would not fit otherwise.
+    Compact,
 }
 
 impl Preset {
-    /// All presets, fastest first.
-    pub const ALL: [Preset; 3] = [Preset::Fast, Preset::Balanced, Preset::Best];
+    /// All presets.
+    pub const ALL: [Preset; 4] = [Preset::Fast, Preset::Balanced, Preset::Best, Preset::Compact];
 
     /// The name used on the command line.
     pub fn name(self) -> &'static str {
@@ -126,6 +128,7 @@ impl Preset {
             Preset::Fast => "fast",
             Preset::Balanced => "balanced",
             Preset::Best => "best",
+            Preset::Compact => "compact",
         }
     }
 }
@@ -149,6 +152,10 @@ pub struct BuildSettings {
     /// store all primitives in leaves once more. A cut must gain more than the copies that it makes
     /// cost, so that duplication goes where rays are likely. 0 is off.
     pub size_cost: f64,
+    /// Largest price of one more unit of leaf cost to a ray that hits the node, in intersection tests.
+    /// Without it, detail that is small in a large scene would not be worth its memory, although
+    /// somebody may look at nothing else.
+    pub max_size_price: f64,
     /// Cut empty slabs off a node that would become a leaf (the paper's Figure 2).
     pub late_cutting: bool,
     /// Clip primitives to the cell ("perfect splits"); otherwise their boxes are sorted.
@@ -175,6 +182,7 @@ impl Default for BuildSettings {
             traversal_cost: 1.0,
             empty_factor: 0.8,
             size_cost: 0.0,
+            max_size_price: 0.8,
             late_cutting: true,
             clipping: true,
             max_duplication: 32.0,
@@ -188,15 +196,17 @@ impl BuildSettings {
     /// The settings for a tree that is compiled to a [`WideTree`](crate::wide::WideTree): leaves
     /// cost their blocks of eight, and a step of three levels costs about as much as a block.
     pub fn preset(preset: Preset) -> Self {
-        let (binned_from, clipping, size_cost) = match preset {
-            Preset::Fast => (0, false, 0.75),
-            Preset::Balanced => (33, true, 0.75),
-            Preset::Best => (usize::MAX, true, 0.25),
+        let (binned_from, clipping, size_cost, max_size_price) = match preset {
+            Preset::Fast => (0, false, 0.75, 0.8),
+            Preset::Balanced => (33, true, 0.75, 0.8),
+            Preset::Best => (usize::MAX, true, 0.25, 0.8),
+            Preset::Compact => (33, true, 6.0, 2.0),
         };
         BuildSettings {
             leaf_cost: LeafCost::Blocks { width: 8 },
             traversal_cost: 0.3,
             size_cost,
+            max_size_price,
             late_cutting: false,
             clipping,
             binned_from,
@@ -222,6 +232,8 @@ impl BuildSettings {
         number(f > 0.0 && f <= 1.0, "empty_factor", f, "above 0 and at most 1")?;
         let s = self.size_cost;
         number(s >= 0.0, "size_cost", s, "a finite number, at least 0")?;
+        let p = self.max_size_price;
+        number(p >= 0.0, "max_size_price", p, "a finite number, at least 0")?;
         let d = self.max_duplication;
         number(d >= 1.0, "max_duplication", d, "a finite number, at least 1")?;
         match self.leaf_cost {

@@ -69,7 +69,7 @@ fn binned_planes_and_presets() {
             let binned_from = [0, 8, 33][draw.below(3)];
             let settings = BuildSettings { binned_from, ..settings(Measure::MacDonaldBooth, draw) };
             check(&settings, geometry.clone(), draw);
-            let preset = Preset::ALL[draw.below(3)];
+            let preset = Preset::ALL[draw.below(Preset::ALL.len())];
             let settings = BuildSettings { threads: 1, ..BuildSettings::preset(preset) };
             check(&settings, geometry, draw);
         }

@@ -38,7 +38,13 @@ fn leaf_cost() -> impl Strategy<Value = LeafCost> {
 }
 
 fn search(leaf_cost: LeafCost, size_unit: f64, from: usize) -> Binned {
-    let pricing = Pricing { leaf_cost, traversal_cost: 0.3, empty_factor: 0.8, size_unit };
+    let pricing = Pricing {
+        leaf_cost,
+        traversal_cost: 0.3,
+        empty_factor: 0.8,
+        size_unit,
+        max_size_price: 0.8,
+    };
     Binned {
         exact: Sweep { model: MacDonaldBooth, pricing, blockage: None },
         from,

@@ -77,6 +77,7 @@ fn check<M: CostModel>(model: M, geometry: &Geometry, estimator: TerminationEsti
         traversal_cost: 1.0,
         empty_factor: 0.8,
         size_unit: 0.0,
+        max_size_price: 0.8,
     };
     let blockage = M::USES_TERMINATION.then_some(&blockage);
     let search = Sweep { model, pricing, blockage };

@@ -1,8 +1,7 @@
 //! Primary, diffuse, shadow, ambient-occlusion and chord rays of a scene.
 
-use super::{Kind, Random, Workload, walk};
-use crate::answer::BenchHit;
-use crate::scene::Scene;
+use crate::vector::{cross, dot, normalize, sub};
+use crate::{BenchHit, Kind, Random, Surface, View, Workload, walk};
 use ropewalk::Ray;
 use std::cell::OnceCell;
 
@@ -18,6 +17,14 @@ pub struct Sizes {
 }
 
 impl Sizes {
+    /// Those of a picture of `side` pixels: a chord for each 16 of them, a segment for each, at
+    /// least a walker.
+    pub const fn of_side(side: usize) -> Sizes {
+        let pixels = side * side;
+        let walkers = if pixels < Sizes::SEGMENTS { 1 } else { pixels / Sizes::SEGMENTS };
+        Sizes { side, chords: pixels.div_ceil(16), walk: walkers * Sizes::SEGMENTS }
+    }
+
     /// Segments of one walker.
     pub const SEGMENTS: usize = 64;
     /// The benchmark proper.
@@ -37,7 +44,8 @@ const OFFSET: f64 = 1e-5;
 /// Makes the workloads of a scene. The tracer answers the nearest hits that secondary rays and
 /// walks start from.
 pub struct Generator<'a> {
-    scene: &'a Scene,
+    ground: &'a dyn Surface,
+    view: &'a View,
     sizes: Sizes,
     trace: &'a dyn Fn(&[Ray], &mut [BenchHit]),
     surface: OnceCell<Vec<SurfacePoint>>,
@@ -52,8 +60,13 @@ struct SurfacePoint {
 
 impl<'a> Generator<'a> {
     /// A generator for a scene.
-    pub fn new(scene: &'a Scene, sizes: Sizes, trace: &'a dyn Fn(&[Ray], &mut [BenchHit])) -> Self {
-        Generator { scene, sizes, trace, surface: OnceCell::new() }
+    pub fn new(
+        ground: &'a dyn Surface,
+        view: &'a View,
+        sizes: Sizes,
+        trace: &'a dyn Fn(&[Ray], &mut [BenchHit]),
+    ) -> Self {
+        Generator { ground, view, sizes, trace, surface: OnceCell::new() }
     }
 
     /// The rays of a workload. [`Kind::Build`] has none; workloads that start on surfaces have
@@ -68,7 +81,7 @@ impl<'a> Generator<'a> {
             Kind::AllHits | Kind::FirstHits => self.chords(),
             Kind::Walk1 | Kind::Walk02 => {
                 let mean = if kind == Kind::Walk1 { 0.01 } else { 0.002 };
-                let walk = walk::segments(&self.scene.mesh, mean, self.sizes.walk, self.trace);
+                let walk = walk::segments(self.ground, mean, self.sizes.walk, self.trace);
                 chains = walk.1;
                 walk.0
             }
@@ -78,7 +91,7 @@ impl<'a> Generator<'a> {
     }
 
     fn primary(&self) -> Vec<Ray> {
-        let (view, side) = (&self.scene.view, self.sizes.side);
+        let (view, side) = (self.view, self.sizes.side);
         let (eye, at) = (view.eye.map(f64::from), view.at.map(f64::from));
         let forward = normalize(sub(at, eye));
         let right = cross(forward, view.up.map(f64::from));
@@ -105,7 +118,7 @@ impl<'a> Generator<'a> {
         let mut grey = vec![0; rays.len()];
         for (code, (ray, hit)) in (0..).zip(rays.iter().zip(&hits)).filter(|(_, r)| r.1.is_hit()) {
             let at = (compact_bits(code >> 1) * side + compact_bits(code)) as usize;
-            let normal = facing_normal(self.scene.mesh.triangle(hit.prim), ray);
+            let normal = self.ground.facing_normal(hit.prim, ray);
             let cosine = normal.map_or(0.0, |n| -dot(n, ray.dir.map(f64::from)));
             grey[at] = 55 + (200.0 * cosine) as u8;
         }
@@ -117,12 +130,12 @@ impl<'a> Generator<'a> {
             let rays = self.primary();
             let mut hits = vec![BenchHit::MISS; rays.len()];
             (self.trace)(&rays, &mut hits);
-            let offset = offset(self.scene.mesh.bounds().diagonal());
+            let offset = offset(self.ground.bounds().diagonal());
             rays.iter()
                 .zip(&hits)
                 .filter(|(_, hit)| hit.is_hit())
                 .filter_map(|(ray, hit)| {
-                    let normal = facing_normal(self.scene.mesh.triangle(hit.prim), ray)?;
+                    let normal = self.ground.facing_normal(hit.prim, ray)?;
                     let on = ray.at(hit.t);
                     let at = std::array::from_fn(|a| on[a] + offset * normal[a]);
                     Some(SurfacePoint { at, normal })
@@ -147,7 +160,7 @@ impl<'a> Generator<'a> {
     }
 
     fn shadow(&self) -> Vec<Ray> {
-        let light = self.scene.view.light.map(f64::from);
+        let light = self.view.light.map(f64::from);
         let to_light = |p: &SurfacePoint| {
             let way = sub(light, p.at);
             let length = dot(way, way).sqrt();
@@ -157,14 +170,13 @@ impl<'a> Generator<'a> {
     }
 
     fn ambient_occlusion(&self) -> Vec<Ray> {
-        let (length, mut random) =
-            (AO_LENGTH * self.scene.mesh.bounds().diagonal(), Random::new(4));
+        let (length, mut random) = (AO_LENGTH * self.ground.bounds().diagonal(), Random::new(4));
         let cast = |p: &SurfacePoint| ray(p.at, cosine_weighted(p.normal, &mut random), length);
         self.surface().iter().map(cast).collect()
     }
 
     fn chords(&self) -> Vec<Ray> {
-        let (bounds, mut random) = (self.scene.mesh.bounds(), Random::new(5));
+        let (bounds, mut random) = (self.ground.bounds(), Random::new(5));
         let radius = bounds.diagonal() / 2.0;
         let center: [f64; 3] =
             std::array::from_fn(|a| (f64::from(bounds.min[a]) + f64::from(bounds.max[a])) / 2.0);
@@ -186,16 +198,6 @@ pub(super) fn offset(diagonal: f64) -> f64 {
     OFFSET * diagonal
 }
 
-/// The unit normal of a triangle on the side that a ray arrives from; `None` without area.
-pub(super) fn facing_normal(corners: [[f32; 3]; 3], ray: &Ray) -> Option<[f64; 3]> {
-    let [a, b, c] = corners.map(|v| v.map(f64::from));
-    let normal = cross(sub(b, a), sub(c, a));
-    let length = dot(normal, normal).sqrt();
-    let facing = dot(normal, ray.dir.map(f64::from));
-    let scale = if facing > 0.0 { -1.0 } else { 1.0 } / length;
-    (length > 0.0).then(|| normal.map(|x| x * scale))
-}
-
 /// A ray over `0 ..= t_max`, rounded to `f32`.
 pub(super) fn ray(origin: [f64; 3], dir: [f64; 3], t_max: f64) -> Ray {
     Ray::new(origin.map(|x| x as f32), dir.map(|x| x as f32)).with_range(0.0, t_max as f32)
@@ -215,62 +217,40 @@ fn compact_bits(code: u64) -> u64 {
     (0..32).fold(0, |out, bit| out | ((code >> (2 * bit)) & 1) << bit)
 }
 
-pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn normalize(v: [f64; 3]) -> [f64; 3] {
-    let length = dot(v, v).sqrt();
-    v.map(|x| x / length)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::harness::Oracle;
-    use crate::scene::{Mesh, View};
+    use crate::triangle_normal;
+    use ropewalk::Geometry;
+    use ropewalk::traverse::{BruteForce, NoCounts, RayCaster};
 
     /// Two walls and a floor, seen from between them.
-    fn corner() -> Scene {
-        let vertices = vec![
-            [0.0, 0.0, 0.0],
-            [4.0, 0.0, 0.0],
-            [0.0, 4.0, 0.0],
-            [0.0, 0.0, 4.0],
-            [4.0, 4.0, 0.0],
-        ];
-        let faces = vec![[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 4, 2]];
-        Scene {
-            mesh: Mesh { name: "corner".into(), vertices, faces },
-            view: View {
-                eye: [3.0, 2.5, 3.5],
-                at: [0.0; 3],
-                up: [0.0, 1.0, 0.0],
-                fov_degrees: 60.0,
-                light: [1.0, 3.0, 1.5],
-            },
-        }
+    fn corner() -> (Geometry, View) {
+        let vertices =
+            [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 4.0], [4.0, 4.0, 0.0]];
+        let faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 4, 2]];
+        let view = View {
+            eye: [3.0, 2.5, 3.5],
+            at: [0.0; 3],
+            up: [0.0, 1.0, 0.0],
+            fov_degrees: 60.0,
+            light: [1.0, 3.0, 1.5],
+        };
+        (Geometry::from_triangles(&vertices, &faces).unwrap(), view)
     }
 
     #[test]
     fn the_same_seed_gives_the_same_rays_and_all_are_sound() {
-        let scene = corner();
-        let oracle = Oracle::new(&scene.mesh);
+        let (geometry, view) = corner();
+        let oracle = BruteForce { geometry: &geometry };
         let trace = |rays: &[Ray], out: &mut [BenchHit]| {
             for (ray, hit) in rays.iter().zip(out) {
-                *hit = oracle.exact(ray).first().copied().unwrap_or(BenchHit::MISS);
+                let found = oracle.closest_hit(ray, &mut NoCounts);
+                *hit = found.map_or(BenchHit::MISS, |h| BenchHit { t: h.t, prim: h.prim_id });
             }
         };
         let sizes = Sizes { side: 32, chords: 100, walk: 4 * Sizes::SEGMENTS };
-        let make = |kind| Generator::new(&scene, sizes, &trace).workload(kind);
+        let make = |kind| Generator::new(&geometry, &view, sizes, &trace).workload(kind);
         for kind in Kind::ALL {
             let work = make(kind);
             assert_eq!(work, make(kind), "{}", kind.name());
@@ -285,6 +265,27 @@ mod tests {
         assert_ne!(make(Kind::Diffuse).rays, make(Kind::AmbientOcclusion).rays);
         assert!(make(Kind::AmbientOcclusion).rays.iter().all(|r| r.t_max < 0.5));
         assert!(make(Kind::Walk1).chains.len() >= 4);
+    }
+
+    #[test]
+    fn sizes_follow_the_picture() {
+        assert_eq!(Sizes::of_side(1024), Sizes::FULL);
+        assert_eq!(Sizes::of_side(1), Sizes { side: 1, chords: 1, walk: Sizes::SEGMENTS });
+    }
+
+    #[test]
+    fn normals_of_primitives_and_of_corners_agree() {
+        let (geometry, view) = corner();
+        let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+        for dir in [[-0.5, -0.4, -1.0], [0.1, 0.2, 1.0]] {
+            let eye = std::array::from_fn(|a| [1.0, 1.0, 0.0][a] - dir[a]);
+            let ray = Ray::new(eye, dir);
+            let (own, expected) = (geometry.facing_normal(0, &ray), triangle_normal(corners, &ray));
+            let (own, expected) = (own.unwrap(), expected.unwrap());
+            assert!(dot(own, dir.map(f64::from)) < 0.0);
+            assert!(sub(own, expected).iter().all(|x| x.abs() < 1e-12), "{own:?} {expected:?}");
+        }
+        assert_eq!(geometry.facing_normal(0, &Ray::new(view.eye, [1.0, 0.0, 0.0])), None);
     }
 
     #[test]

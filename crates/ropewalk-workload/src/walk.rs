@@ -1,9 +1,8 @@
 //! Transport walks: particles with exponential steps that scatter isotropically.
 
-use super::generate::{dot, facing_normal, offset, ray, sub};
-use super::{Random, Sizes};
-use crate::answer::BenchHit;
-use crate::scene::Mesh;
+use crate::generate::{offset, ray};
+use crate::vector::{dot, sub};
+use crate::{BenchHit, Random, Sizes, Surface};
 use ropewalk::{Aabb, Ray};
 
 /// A particle under way.
@@ -22,12 +21,12 @@ struct Walker {
 /// walker scatters back into the half space it came from; a walker that leaves the box starts
 /// anew, which begins a new chain. `mean` is the mean free path in diagonals.
 pub(super) fn segments(
-    mesh: &Mesh,
+    ground: &dyn Surface,
     mean: f64,
     count: usize,
     trace: &dyn Fn(&[Ray], &mut [BenchHit]),
 ) -> (Vec<Ray>, Vec<u32>) {
-    let bounds = mesh.bounds();
+    let bounds = ground.bounds();
     let (path, off) = (mean * bounds.diagonal(), offset(bounds.diagonal()));
     let walkers = count / Sizes::SEGMENTS;
     let mut crowd: Vec<Walker> = (0..walkers)
@@ -53,7 +52,7 @@ pub(super) fn segments(
         }
         trace(&step_rays, &mut hits);
         for ((walker, segment), hit) in crowd.iter_mut().zip(&step_rays).zip(&hits) {
-            walker.arrive(mesh, &bounds, segment, hit, off);
+            walker.arrive(ground, &bounds, segment, hit, off);
         }
     }
     chains.sort_unstable();
@@ -73,11 +72,17 @@ impl Walker {
     }
 
     /// Moves to the end of the segment or to its hit.
-    fn arrive(&mut self, mesh: &Mesh, bounds: &Aabb, segment: &Ray, hit: &BenchHit, off: f64) {
+    fn arrive(
+        &mut self,
+        ground: &dyn Surface,
+        bounds: &Aabb,
+        segment: &Ray,
+        hit: &BenchHit,
+        off: f64,
+    ) {
         let t = if hit.is_hit() { hit.t } else { segment.t_max };
         self.at = segment.at(t);
-        self.surface =
-            hit.is_hit().then(|| facing_normal(mesh.triangle(hit.prim), segment)).flatten();
+        self.surface = hit.is_hit().then(|| ground.facing_normal(hit.prim, segment)).flatten();
         if let Some(normal) = self.surface {
             self.at = std::array::from_fn(|a| self.at[a] + off * normal[a]);
         }

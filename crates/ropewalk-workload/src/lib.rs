@@ -3,12 +3,19 @@
 //! All directions have unit length and all ranges start at 0, since not every peer takes another
 //! start; origins on surfaces are moved off them by 1e-5 of the diagonal.
 
+#![forbid(unsafe_code)]
+
 mod generate;
+mod hit;
 mod random;
+mod surface;
+mod vector;
 mod walk;
 
 pub use generate::{Generator, Sizes};
+pub use hit::{BenchHit, NO_PRIMITIVE};
 pub use random::Random;
+pub use surface::{Surface, View, triangle_normal};
 
 use ropewalk::Ray;
 
