@@ -5,7 +5,7 @@ CARGO ?= cargo
 OUT ?= out
 FUZZ_SECONDS ?= 60
 
-.PHONY: help demo test check fmt clippy unit doc inlined fuzz bench bench-build clean
+.PHONY: help demo test check fmt clippy unit doc inlined python fuzz bench bench-build bench-python clean
 
 help: ## List the commands
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -24,7 +24,7 @@ demo: tools ## Render a scene to a picture and print what each idea of the 1997 
 	@./target/release/ropewalk paper --scenes gears --size standard --rays 20000 --no-sensitivity -o $(OUT)/paper.html
 	@echo "==> picture: $(OUT)/gears.png   report: $(OUT)/paper.html"
 
-test: tools fmt clippy unit doc inlined fuzz ## Everything that CI runs: format, lints, tests, doc tests, docs, inlining, fuzz
+test: tools fmt clippy unit doc inlined python fuzz ## Everything that CI runs: format, lints, tests, docs, inlining, the Python package, fuzz
 
 fmt: tools
 	@echo "==> format"
@@ -46,6 +46,10 @@ inlined: tools
 	@echo "==> vector instructions inlined"
 	@scripts/inlined
 
+python: tools ## Install the Python package into a fresh virtual environment and test it there (needs python3)
+	@echo "==> the Python package"
+	@scripts/test-python
+
 fuzz: tools ## Fuzz the NFF reader for FUZZ_SECONDS (needs a nightly toolchain)
 	@scripts/fuzz $(FUZZ_SECONDS)
 
@@ -56,5 +60,8 @@ bench-build: tools ## Time the builder from 10^4 to 10^6 triangles, and its pres
 	@$(CARGO) run --release --locked --quiet -p ropewalk-bench --bin build_speed
 	@$(CARGO) run --release --locked --quiet -p ropewalk-bench --bin build_presets
 
+bench-python: tools ## Rays per second through Python against embreex and other packages
+	@scripts/bench-python
+
 clean: ## Remove everything made here
-	@rm -rf $(OUT) target
+	@rm -rf $(OUT) target .venv-python

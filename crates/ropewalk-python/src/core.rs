@@ -1,0 +1,603 @@
+//! A scene with its tree, and the batch queries.
+
+use crate::error::{self, Failure};
+use crate::rays::{Invalid, Rays, View, one};
+use crate::surface::{self, Surface};
+use crate::{state, work};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use ropewalk::build::{BuildReport, BuildSettings, Monitor, Preset};
+use ropewalk::kernel::{AllHits, BatchCaster, HitFilter};
+use ropewalk::primitive::Triangle;
+use ropewalk::wide::WideTree;
+use ropewalk::{Geometry, GeometryError, Hit, Ray, Shape, Sides};
+use ropewalk_scene::{FacetPolicy, NffLimits, load_scene};
+use std::cell::RefCell;
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Rays that one task interleaves and traces: half a megabyte.
+const BLOCK: usize = 16_384;
+
+/// The same over trees of at least [`LARGE_TREE`] bytes: the engine sorts many incoherent rays there.
+const LARGE_BLOCK: usize = 1 << 18;
+
+/// See [`LARGE_BLOCK`].
+const LARGE_TREE: usize = 32 << 20;
+
+/// The fewest rays of a task where several threads share a batch.
+const MIN_BLOCK: usize = 1024;
+
+/// Tasks a thread, so that none waits long for the slowest.
+const TASKS_PER_THREAD: usize = 4;
+
+/// A geometry of one or more meshes and the tree over it. It never changes.
+#[pyclass(frozen, module = "ropewalk._ropewalk")]
+pub struct Core {
+    geometry: Geometry,
+    tree: WideTree,
+    report: BuildReport,
+    /// The first primitive of each mesh, and the number of primitives.
+    starts: Vec<u32>,
+    /// Masks of the meshes.
+    masks: Vec<u32>,
+    preset: Preset,
+}
+
+/// Watches a build for Python.
+struct Watch<'a> {
+    stop: &'a AtomicBool,
+    /// The largest share done so far, as the bits of an `f64`, which are ordered as the numbers are.
+    done: &'a AtomicU64,
+}
+
+impl Monitor for Watch<'_> {
+    fn progress(&self, fraction: f64) {
+        self.done.fetch_max(fraction.max(0.0).to_bits(), Ordering::Relaxed);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+}
+
+/// Parameters and primitives of a block.
+type TAndPrim<'a> = (&'a mut [f32], &'a mut [i32]);
+
+/// Vertices and faces.
+type Mesh<'a> = (&'a [[f32; 3]], &'a [[u32; 3]]);
+
+/// A geometry, the first primitive of each mesh, and how many primitives there are.
+type Parts = (Geometry, Vec<u32>);
+
+/// Parameters, primitives and meshes of hits, how many rays were invalid and which was the first.
+type Answer<'py> =
+    (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<i32>>, usize, usize);
+
+/// The same in rows that begin at the first array's entries.
+type Rows<'py> = (
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<i32>>,
+    Bound<'py, PyArray1<i32>>,
+    usize,
+    usize,
+);
+
+#[pymethods]
+impl Core {
+    /// Builds a tree over meshes: vertices, faces and a mask of each.
+    #[staticmethod]
+    #[pyo3(signature = (vertices, faces, masks, preset, threads, progress=None))]
+    fn build(
+        py: Python<'_>,
+        vertices: Vec<PyReadonlyArray2<'_, f32>>,
+        faces: Vec<PyReadonlyArray2<'_, u32>>,
+        masks: Vec<u32>,
+        preset: &str,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Core> {
+        let one_mesh = vertices.len() == 1;
+        let mut meshes = Vec::with_capacity(vertices.len());
+        for (vertices, faces) in vertices.iter().zip(&faces) {
+            let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
+            let (faces, _) = faces.as_slice()?.as_chunks::<3>();
+            meshes.push((vertices, faces));
+        }
+        let make = || triangles(&meshes);
+        Self::of(py, make, masks, preset, threads, progress, one_mesh)
+    }
+
+    /// Loads a scene file or a built-in scene, object by object as primitives of one mesh.
+    #[staticmethod]
+    #[pyo3(signature = (path, preset, threads, progress=None))]
+    fn load(
+        py: Python<'_>,
+        path: &str,
+        preset: &str,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Core> {
+        let make = || {
+            let scene = load_scene(path, &NffLimits::default()).map_err(Failure::File)?;
+            let geometry = scene.geometry(FacetPolicy::TwoSided).map_err(Failure::Objects)?;
+            let count = geometry.len() as u32;
+            Ok((geometry, vec![0, count]))
+        };
+        Self::of(py, make, vec![!0], preset, threads, progress, true)
+    }
+
+    /// Builds what [`Core::state`] returned.
+    #[staticmethod]
+    fn from_state(
+        py: Python<'_>,
+        kinds: PyReadonlyArray1<'_, u8>,
+        ends: PyReadonlyArray1<'_, u64>,
+        numbers: PyReadonlyArray1<'_, f32>,
+        starts: Vec<u32>,
+        masks: Vec<u32>,
+        preset: &str,
+        threads: usize,
+    ) -> PyResult<Core> {
+        let (kinds, ends, numbers) = (kinds.as_slice()?, ends.as_slice()?, numbers.as_slice()?);
+        let bad = || error::argument("state", None, "the pickled scene is damaged".into());
+        let sound = starts.len() == masks.len() + 1
+            && starts.is_sorted()
+            && starts.first() == Some(&0)
+            && starts.last().is_some_and(|&n| n as usize == kinds.len());
+        let geometry = state::read(kinds, ends, numbers).filter(|_| sound).ok_or_else(bad)?;
+        Self::of(py, || Ok((geometry, starts)), masks, preset, threads, None, true)
+    }
+
+    /// Everything that makes the scene, as arrays and lists.
+    #[allow(clippy::type_complexity)]
+    fn state<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> (
+        Bound<'py, PyArray1<u8>>,
+        Bound<'py, PyArray1<u64>>,
+        Bound<'py, PyArray1<f32>>,
+        Vec<u32>,
+        Vec<u32>,
+        &'static str,
+    ) {
+        let (kinds, ends, numbers) = py.detach(|| state::write(&self.geometry));
+        let (kinds, ends) = (kinds.into_pyarray(py), ends.into_pyarray(py));
+        let preset = self.preset.name();
+        (kinds, ends, numbers.into_pyarray(py), self.starts.clone(), self.masks.clone(), preset)
+    }
+
+    /// The first primitive of each mesh, and the number of primitives.
+    #[getter]
+    fn starts(&self) -> Vec<u32> {
+        self.starts.clone()
+    }
+
+    /// Masks of the meshes.
+    #[getter]
+    fn masks(&self) -> Vec<u32> {
+        self.masks.clone()
+    }
+
+    /// Lower and upper corner of the box of everything.
+    #[getter]
+    fn bounds(&self) -> Option<([f32; 3], [f32; 3])> {
+        let bounds = self.geometry.bounds();
+        (!self.geometry.is_empty()).then_some((bounds.min, bounds.max))
+    }
+
+    /// Figures of the build and of the tree.
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let (report, stats) = (&self.report, &self.report.tree);
+        let figures = PyDict::new(py);
+        figures.set_item("preset", self.preset.name())?;
+        figures.set_item("meshes", self.masks.len())?;
+        figures.set_item("primitives", report.primitives)?;
+        figures.set_item("degenerate", report.degenerate)?;
+        figures.set_item("references", stats.references)?;
+        figures.set_item("duplication", report.duplication)?;
+        figures.set_item("inner_nodes", stats.inner_nodes)?;
+        figures.set_item("leaves", stats.leaves)?;
+        figures.set_item("empty_leaves", stats.empty_leaves)?;
+        figures.set_item("max_depth", stats.max_depth)?;
+        figures.set_item("tree_bytes", self.tree.bytes())?;
+        let shapes = self.geometry.len() * (size_of::<Shape>() + size_of::<Sides>());
+        figures.set_item("geometry_bytes", shapes)?;
+        figures.set_item("predicted_steps", stats.predicted_inner_visits)?;
+        figures.set_item("predicted_leaves", stats.predicted_leaf_visits)?;
+        figures.set_item("predicted_tests", stats.predicted_intersection_tests)?;
+        figures.set_item("leaf_sizes", stats.leaf_sizes.clone())?;
+        figures.set_item("seconds", report.seconds)?;
+        Ok(figures)
+    }
+
+    /// Parameter, primitive and mesh of the first hit of each ray; infinity, -1 and -1 for a miss.
+    fn closest_hit<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Rays,
+        threads: usize,
+    ) -> PyResult<Answer<'py>> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let n = view.count;
+        let (mut t, mut prim, mut geom) = (zeros::<f32>(n)?, zeros::<i32>(n)?, zeros::<i32>(n)?);
+        let block = block(n, threads, self.block_size());
+        let chunks = t.chunks_mut(block).zip(prim.chunks_mut(block)).zip(geom.chunks_mut(block));
+        let tasks = blocks(n, block).zip(chunks).collect();
+        let trace = |(range, ((t, prim), geom)): (Range<usize>, (TAndPrim<'_>, _))| {
+            let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
+            let invalid = self.block(&view, range, |caster, filter, rays| match filter {
+                Some(filter) => drop(caster.with_filter(filter).closest_hit_into(rays, t, prim)),
+                None if rays.len() == 1 => {
+                    let hit = caster.closest_hit_one(&rays[0]);
+                    (t[0], prim[0]) = hit.map_or((f32::INFINITY, !0), |hit| (hit.t, hit.prim_id));
+                }
+                None => drop(caster.closest_hit_into(rays, t, prim)),
+            });
+            self.number(prim, geom);
+            invalid
+        };
+        let invalid = total(work::for_each(py, threads, tasks, trace)?);
+        let (t, prim, geom) = (t.into_pyarray(py), prim.into_pyarray(py), geom.into_pyarray(py));
+        Ok((t, prim, geom, invalid.count, invalid.first))
+    }
+
+    /// Whether each ray hits anything.
+    fn occluded<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Rays,
+        threads: usize,
+    ) -> PyResult<(Bound<'py, PyArray1<bool>>, usize, usize)> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let mut hit = vec![false; checked::<bool>(view.count)?];
+        let block = block(view.count, threads, self.block_size());
+        let tasks = blocks(view.count, block).zip(hit.chunks_mut(block)).collect();
+        let trace = |(range, hit): (Range<usize>, &mut [bool])| {
+            self.block(&view, range, |caster, filter, rays| match filter {
+                Some(filter) => drop(caster.with_filter(filter).occluded_into(rays, hit)),
+                None if rays.len() == 1 => hit[0] = caster.occluded_one(&rays[0]),
+                None => drop(caster.occluded_into(rays, hit)),
+            })
+        };
+        let invalid = total(work::for_each(py, threads, tasks, trace)?);
+        Ok((hit.into_pyarray(py), invalid.count, invalid.first))
+    }
+
+    /// The number of primitives that each ray hits.
+    fn count_hits<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Rays,
+        threads: usize,
+    ) -> PyResult<(Bound<'py, PyArray1<i32>>, usize, usize)> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let mut counts = zeros::<i32>(view.count)?;
+        let block = block(view.count, threads, BLOCK);
+        let tasks = blocks(view.count, block).zip(counts.chunks_mut(block)).collect();
+        let trace = |(range, counts): (Range<usize>, &mut [i32])| {
+            self.block(&view, range, |caster, filter, rays| {
+                let found = match filter {
+                    Some(filter) => caster.with_filter(filter).count_hits(rays),
+                    None => caster.count_hits(rays),
+                };
+                counts.copy_from_slice(bytemuck::cast_slice(&found));
+            })
+        };
+        let invalid = total(work::for_each(py, threads, tasks, trace)?);
+        Ok((counts.into_pyarray(py), invalid.count, invalid.first))
+    }
+
+    /// The first `k` hits of each ray in order, or all of them.
+    #[pyo3(signature = (rays, threads, k=None))]
+    fn first_hits<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Rays,
+        threads: usize,
+        k: Option<usize>,
+    ) -> PyResult<Rows<'py>> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let (n, k) = (view.count, k.unwrap_or(usize::MAX));
+        let ranges = blocks(n, block(n, threads, BLOCK)).collect();
+        let trace = |range: Range<usize>| {
+            let mut all = AllHits::default();
+            let invalid = self.block(&view, range, |caster, filter, rays| match filter {
+                Some(filter) => caster.with_filter(filter).first_hits_into(rays, k, &mut all),
+                None => caster.first_hits_into(rays, k, &mut all),
+            });
+            (all, invalid)
+        };
+        let (parts, invalid): (Vec<AllHits>, Vec<Invalid>) =
+            work::for_each(py, threads, ranges, trace)?.into_iter().unzip();
+        let invalid = total(invalid);
+        let found = parts.iter().map(|part| part.t.len()).sum();
+        let mut offsets = zeros::<i64>(n + 1)?;
+        let (mut t, mut prim, mut geom) =
+            (zeros::<f32>(found)?, zeros::<i32>(found)?, zeros::<i32>(found)?);
+        let mut tasks = Vec::with_capacity(parts.len());
+        let (mut ends, mut to) = (&mut offsets[1..], (&mut t[..], &mut prim[..], &mut geom[..]));
+        let mut start = 0;
+        for part in parts {
+            let len = part.t.len();
+            let row = (split(&mut to.0, len), split(&mut to.1, len), split(&mut to.2, len));
+            let count = part.offsets.len() - 1;
+            tasks.push((part, start, split(&mut ends, count), row));
+            start += len;
+        }
+        work::for_each(py, threads, tasks, |(part, start, ends, (t, prim, geom))| {
+            for (end, offset) in ends.iter_mut().zip(&part.offsets[1..]) {
+                *end = (start + offset) as i64;
+            }
+            t.copy_from_slice(&part.t);
+            let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
+            prim.copy_from_slice(&part.prim_id);
+            self.number(prim, geom);
+        })?;
+        let (t, prim, geom) = (t.into_pyarray(py), prim.into_pyarray(py), geom.into_pyarray(py));
+        Ok((offsets.into_pyarray(py), t, prim, geom, invalid.count, invalid.first))
+    }
+
+    /// Surface coordinates, unit normals or positions of hits, by `what`, and how many of the hits
+    /// are none: rays have been changed since. `ray` names the ray of each hit, or each ray has one.
+    #[pyo3(signature = (what, rays, t, prim, geom, threads, ray=None))]
+    fn surface<'py>(
+        &self,
+        py: Python<'py>,
+        what: &str,
+        rays: &Rays,
+        t: PyReadonlyArray1<'py, f32>,
+        prim: PyReadonlyArray1<'py, i32>,
+        geom: PyReadonlyArray1<'py, i32>,
+        threads: usize,
+        ray: Option<PyReadonlyArray1<'py, i64>>,
+    ) -> PyResult<(Bound<'py, PyArray2<f32>>, usize)> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let (t, prim, geom) = (t.as_slice()?, prim.as_slice()?, geom.as_slice()?);
+        let ray = ray.as_ref().map(|ray| ray.as_slice()).transpose()?;
+        let n = t.len();
+        let surface = Surface::named(what);
+        let rows = ray.map_or(view.count, <[i64]>::len);
+        if prim.len() != n || geom.len() != n || rows != n {
+            return Err(error::argument("hits", None, "arrays of hits differ in length".into()));
+        }
+        let width = surface.width();
+        let mut values = zeros::<f32>(n * width)?;
+        let block = block(n, threads, BLOCK);
+        let tasks = blocks(n, block).zip(values.chunks_mut(block * width)).collect();
+        let look = |(range, values): (Range<usize>, &mut [f32])| {
+            let mut lost = 0;
+            for (i, value) in range.zip(values.chunks_exact_mut(width)) {
+                value.fill(f32::NAN);
+                let Some(prim) = self.primitive(prim[i], geom[i]) else { continue };
+                let ray = ray.map_or(i, |ray| ray[i] as usize);
+                let line = (ray < view.count).then(|| view.line(ray));
+                let found = line.is_some_and(|(origin, dir)| {
+                    let ray = Ray { origin, dir, t_min: t[i], t_max: t[i] };
+                    surface::look(&self.geometry, surface, &ray, prim, value)
+                });
+                lost += usize::from(!found);
+            }
+            lost
+        };
+        let lost = work::for_each(py, threads, tasks, look)?.into_iter().sum();
+        Ok((values.into_pyarray(py).reshape([n, width])?, lost))
+    }
+
+    /// Seconds that the engine itself takes for the batch on one thread, rays interleaved and room for
+    /// answers made beforehand: what the layer above costs is measured against it.
+    fn engine_seconds(&self, py: Python<'_>, query: &str, rays: &Rays) -> PyResult<f64> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        Ok(py.detach(|| {
+            let mut rays = Vec::with_capacity(view.count);
+            view.interleave(0..view.count, &mut rays);
+            let caster = BatchCaster::new(&self.tree, &self.geometry).with_threads(1);
+            let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
+            let mut all = AllHits::default();
+            let block = if query == "closest_hit" { self.block_size() } else { BLOCK };
+            let start = std::time::Instant::now();
+            for (i, rays) in rays.chunks(block).enumerate() {
+                let at = i * block..i * block + rays.len();
+                match query {
+                    "closest_hit" => {
+                        caster.closest_hit_into(rays, &mut t[at.clone()], &mut prim[at]);
+                    }
+                    _ => caster.all_hits_into(rays, &mut all),
+                }
+            }
+            start.elapsed().as_secs_f64()
+        }))
+    }
+}
+
+impl Core {
+    fn of(
+        py: Python<'_>,
+        make: impl FnOnce() -> Result<Parts, Failure> + Send,
+        masks: Vec<u32>,
+        preset: &str,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+        one_mesh: bool,
+    ) -> PyResult<Core> {
+        let Some(preset) = Preset::ALL.into_iter().find(|p| p.name() == preset) else {
+            let names = Preset::ALL.map(Preset::name).join(", ");
+            let message = format!("preset is '{preset}'; expected one of {names}");
+            return Err(error::argument("preset", None, message));
+        };
+        // Work with 0 threads runs in the current pool, which is the one that `watch` chose.
+        let settings =
+            BuildSettings { threads: usize::from(threads == 1), ..BuildSettings::preset(preset) };
+        let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
+        let show = |py: Python<'_>| match &progress {
+            Some(progress) => {
+                progress.call1(py, (f64::from_bits(done.load(Ordering::Relaxed)),)).map(drop)
+            }
+            None => Ok(()),
+        };
+        let job = || {
+            let (geometry, starts) = make()?;
+            let watch = Watch { stop: &stop, done: &done };
+            let (tree, report) =
+                WideTree::build(&geometry, &settings, &watch).map_err(Failure::Build)?;
+            Ok((geometry, starts, tree, report))
+        };
+        let (geometry, starts, tree, report) = work::watch(py, threads, &stop, show, job)?
+            .map_err(|failure: Failure| failure.into_exception(one_mesh))?;
+        if let Some(progress) = &progress {
+            progress.call1(py, (1.0,))?;
+        }
+        Ok(Core { geometry, tree, report, starts, masks, preset })
+    }
+
+    /// Rays of a task that asks for first hits.
+    fn block_size(&self) -> usize {
+        if self.tree.bytes() >= LARGE_TREE { LARGE_BLOCK } else { BLOCK }
+    }
+
+    /// The primitive numbered through all meshes; `None` for a miss and for what is not there.
+    fn primitive(&self, prim: i32, geom: i32) -> Option<u32> {
+        let (prim, geom) = (u32::try_from(prim).ok()?, usize::try_from(geom).ok()?);
+        let (start, end) = (*self.starts.get(geom)?, *self.starts.get(geom + 1)?);
+        let prim = start.checked_add(prim)?;
+        (prim < end).then_some(prim)
+    }
+
+    /// The mesh of a primitive.
+    fn mesh(&self, prim: u32) -> usize {
+        if self.masks.len() == 1 {
+            return 0;
+        }
+        self.starts.partition_point(|&start| start <= prim) - 1
+    }
+
+    /// Numbers primitives within their meshes; misses become -1.
+    fn number(&self, prim: &mut [u32], geom: &mut [i32]) {
+        for (prim, geom) in prim.iter_mut().zip(geom) {
+            if *prim == u32::MAX {
+                *geom = -1;
+                continue;
+            }
+            let mesh = self.mesh(*prim);
+            *prim -= self.starts[mesh];
+            *geom = mesh as i32;
+        }
+    }
+
+    /// Interleaves some rays and has them traced, with a filter where one is needed.
+    fn block<'a>(
+        &'a self,
+        view: &View<'a>,
+        range: Range<usize>,
+        trace: impl FnOnce(BatchCaster<'a>, Option<RayFilter<'a>>, &[Ray]),
+    ) -> Invalid {
+        thread_local! {
+            static RAYS: RefCell<Vec<Ray>> = const { RefCell::new(Vec::new()) };
+        }
+        let masks = (view.masks.is_some() || self.masks.contains(&0))
+            .then_some(view.masks.unwrap_or(&[!0]));
+        let filter = (masks.is_some() || view.skip.is_some()).then_some(RayFilter {
+            first: range.start,
+            core: self,
+            masks,
+            skip: view.skip,
+        });
+        RAYS.with_borrow_mut(|rays| {
+            let invalid = view.interleave(range, rays);
+            let caster = BatchCaster::new(&self.tree, &self.geometry).with_threads(1);
+            trace(caster, filter, rays);
+            invalid
+        })
+    }
+}
+
+/// Masks of rays and meshes, and a primitive a ray that does not count.
+struct RayFilter<'a> {
+    first: usize,
+    core: &'a Core,
+    masks: Option<&'a [u32]>,
+    skip: Option<&'a [u32]>,
+}
+
+impl HitFilter for RayFilter<'_> {
+    #[inline]
+    fn accepts(&self, ray: usize, hit: &Hit) -> bool {
+        let ray = self.first + ray;
+        let core = self.core;
+        self.skip.is_none_or(|skip| one(skip, ray) != hit.prim_id)
+            && self
+                .masks
+                .is_none_or(|masks| one(masks, ray) & core.masks[core.mesh(hit.prim_id)] != 0)
+    }
+}
+
+/// The triangles of some meshes.
+fn triangles(meshes: &[Mesh<'_>]) -> Result<Parts, Failure> {
+    let mut geometry = Geometry::new();
+    let mut starts = vec![0];
+    for (mesh, &(vertices, faces)) in meshes.iter().enumerate() {
+        let refuse = |error| Failure::Mesh(mesh, error);
+        if let Some(vertex) = vertices.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
+            return Err(refuse(GeometryError::Vertex { vertex, found: vertices[vertex] }));
+        }
+        if meshes.len() == 1 && !faces.is_empty() {
+            geometry = Geometry::from_triangles(vertices, faces).map_err(refuse)?;
+        } else {
+            for (face, corners) in faces.iter().enumerate() {
+                if let Some(&found) = corners.iter().find(|&&i| i as usize >= vertices.len()) {
+                    let vertices = vertices.len();
+                    return Err(refuse(GeometryError::Face { face, found, vertices }));
+                }
+                let vertices = corners.map(|i| vertices[i as usize]);
+                geometry.push(Triangle { vertices }, Sides::Both).map_err(refuse)?;
+            }
+        }
+        starts.push(geometry.len() as u32);
+    }
+    Ok((geometry, starts))
+}
+
+fn total(parts: Vec<Invalid>) -> Invalid {
+    parts.into_iter().fold(Invalid::default(), Invalid::and)
+}
+
+/// Rays of a task, `most` at most.
+fn block(rays: usize, threads: usize, most: usize) -> usize {
+    match threads {
+        1 => most,
+        _ => rays.div_ceil(threads.max(1) * TASKS_PER_THREAD).clamp(MIN_BLOCK, most),
+    }
+}
+
+fn blocks(rays: usize, block: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..rays).step_by(block).map(move |start| start..rays.min(start + block))
+}
+
+/// Splits `n` entries off the front.
+fn split<'a, T>(row: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+    row.split_off_mut(..n).expect("rows are as long as their parts together")
+}
+
+/// `len` if so many values can be had.
+fn checked<T>(len: usize) -> PyResult<usize> {
+    match Vec::<T>::new().try_reserve_exact(len) {
+        Ok(()) => Ok(len),
+        Err(_) => {
+            let bytes = len.saturating_mul(size_of::<T>());
+            Err(error::memory(format!("an array of {len} values, {bytes} bytes, cannot be had")))
+        }
+    }
+}
+
+fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> PyResult<Vec<T>> {
+    Ok(vec![T::zeroed(); checked::<T>(len)?])
+}

@@ -1,0 +1,40 @@
+//! The extension module of the Python package `ropewalk`: arrays in, arrays out.
+//!
+//! It is as thin as it can be: python/ropewalk checks what users give and makes contiguous arrays of
+//! it, this module shares rays out over threads without the GIL and stops when Ctrl-C is pressed.
+
+#![forbid(unsafe_code)]
+// Signatures are those that Python sees.
+#![allow(clippy::too_many_arguments)]
+
+mod core;
+mod error;
+mod rays;
+mod state;
+mod surface;
+mod work;
+
+use pyo3::prelude::*;
+
+/// Compiled part of the package; everything in it is private to the package.
+#[pymodule(gil_used = false)]
+mod _ropewalk {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::core::Core;
+    #[pymodule_export]
+    use crate::rays::Rays;
+
+    /// The SIMD level that queries use on this machine: scalar, avx2 or avx512.
+    #[pyfunction]
+    fn simd_level() -> &'static str {
+        ropewalk::kernel::Level::best().name()
+    }
+
+    /// How many threads `threads=0` means.
+    #[pyfunction]
+    fn default_threads() -> usize {
+        crate::work::default_threads()
+    }
+}

@@ -1,0 +1,194 @@
+//! Rays as NumPy has them: arrays beside each other, interleaved block by block.
+
+use crate::error;
+use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
+use pyo3::prelude::*;
+use ropewalk::Ray;
+use std::ops::Range;
+
+/// A batch of rays: arrays with one entry a ray, or with one for all of them.
+#[pyclass(frozen, module = "ropewalk._ropewalk")]
+pub struct Rays {
+    count: usize,
+    origins: Py<PyArray1<f32>>,
+    directions: Py<PyArray1<f32>>,
+    t_min: Py<PyArray1<f32>>,
+    t_max: Py<PyArray1<f32>>,
+    masks: Option<Py<PyArray1<u32>>>,
+    skip: Option<Py<PyArray1<i32>>>,
+}
+
+#[pymethods]
+impl Rays {
+    /// Arrays must be contiguous: three numbers a ray in `origins` and `directions`, one in the others.
+    #[new]
+    #[pyo3(signature = (count, origins, directions, t_min, t_max, masks=None, skip=None))]
+    fn new(
+        py: Python<'_>,
+        count: usize,
+        origins: Py<PyArray1<f32>>,
+        directions: Py<PyArray1<f32>>,
+        t_min: Py<PyArray1<f32>>,
+        t_max: Py<PyArray1<f32>>,
+        masks: Option<Py<PyArray1<u32>>>,
+        skip: Option<Py<PyArray1<i32>>>,
+    ) -> PyResult<Rays> {
+        let rays = Rays { count, origins, directions, t_min, t_max, masks, skip };
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let fits = |len: usize, each: usize| {
+            len == each || each.checked_mul(count).is_some_and(|needed| len == needed)
+        };
+        let fit = fits(view.origins.len(), 3)
+            && fits(view.directions.len(), 3)
+            && fits(view.t_min.len(), 1)
+            && fits(view.t_max.len(), 1)
+            && view.masks.is_none_or(|masks| fits(masks.len(), 1))
+            && view.skip.is_none_or(|skip| fits(skip.len(), 1));
+        if !fit {
+            return Err(error::argument("rays", None, "arrays of rays differ in length".into()));
+        }
+        drop(arrays);
+        Ok(rays)
+    }
+
+    /// Number of rays.
+    fn __len__(&self) -> usize {
+        self.count
+    }
+
+    /// Index of the first ray that can hit nothing; see `Ray::is_valid`.
+    fn first_invalid(&self, py: Python<'_>) -> PyResult<Option<usize>> {
+        let arrays = self.borrow(py)?;
+        let view = arrays.view()?;
+        Ok(py.detach(|| (0..view.count).find(|&i| !view.ray(i).is_valid())))
+    }
+}
+
+impl Rays {
+    /// The arrays, readable until the borrow is dropped.
+    pub fn borrow<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py>> {
+        Ok(Borrowed {
+            count: self.count,
+            origins: borrow(py, &self.origins)?,
+            directions: borrow(py, &self.directions)?,
+            t_min: borrow(py, &self.t_min)?,
+            t_max: borrow(py, &self.t_max)?,
+            masks: self.masks.as_ref().map(|masks| borrow(py, masks)).transpose()?,
+            skip: self.skip.as_ref().map(|skip| borrow(py, skip)).transpose()?,
+        })
+    }
+}
+
+fn borrow<'py, T: Element>(
+    py: Python<'py>,
+    array: &Py<PyArray1<T>>,
+) -> PyResult<PyReadonlyArray1<'py, T>> {
+    Ok(array.bind(py).try_readonly()?)
+}
+
+/// Borrowed arrays.
+pub struct Borrowed<'py> {
+    count: usize,
+    origins: PyReadonlyArray1<'py, f32>,
+    directions: PyReadonlyArray1<'py, f32>,
+    t_min: PyReadonlyArray1<'py, f32>,
+    t_max: PyReadonlyArray1<'py, f32>,
+    masks: Option<PyReadonlyArray1<'py, u32>>,
+    skip: Option<PyReadonlyArray1<'py, i32>>,
+}
+
+impl Borrowed<'_> {
+    /// Their numbers.
+    pub fn view(&self) -> PyResult<View<'_>> {
+        let masks = self.masks.as_ref().map(|masks| masks.as_slice()).transpose()?;
+        let skip = self.skip.as_ref().map(|skip| skip.as_slice()).transpose()?;
+        Ok(View {
+            count: self.count,
+            origins: self.origins.as_slice()?,
+            directions: self.directions.as_slice()?,
+            t_min: self.t_min.as_slice()?,
+            t_max: self.t_max.as_slice()?,
+            masks,
+            skip: skip.map(bytemuck::cast_slice),
+        })
+    }
+}
+
+/// The numbers of some rays.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    /// How many rays.
+    pub count: usize,
+    origins: &'a [f32],
+    directions: &'a [f32],
+    t_min: &'a [f32],
+    t_max: &'a [f32],
+    /// Masks of the rays.
+    pub masks: Option<&'a [u32]>,
+    /// Primitives to ignore, numbered through all meshes; `u32::MAX` is none.
+    pub skip: Option<&'a [u32]>,
+}
+
+/// Rays of a batch that hit nothing whatever the scene, their ranges aside.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Invalid {
+    /// How many.
+    pub count: usize,
+    /// The first of them.
+    pub first: usize,
+}
+
+impl Invalid {
+    /// Those of two batches, the first batch before the second.
+    pub fn and(self, later: Invalid) -> Invalid {
+        let first = if self.count > 0 { self.first } else { later.first };
+        Invalid { count: self.count + later.count, first }
+    }
+}
+
+impl View<'_> {
+    /// Origin and direction of a ray.
+    #[inline(always)]
+    pub fn line(&self, i: usize) -> ([f32; 3], [f32; 3]) {
+        (three(self.origins, i), three(self.directions, i))
+    }
+
+    #[inline(always)]
+    fn ray(&self, i: usize) -> Ray {
+        let (origin, dir) = self.line(i);
+        Ray { origin, dir, t_min: one(self.t_min, i), t_max: one(self.t_max, i) }
+    }
+
+    /// Writes some rays to `rays`.
+    pub fn interleave(&self, range: Range<usize>, rays: &mut Vec<Ray>) -> Invalid {
+        rays.clear();
+        let mut invalid = Invalid::default();
+        rays.extend(range.map(|i| {
+            let ray = self.ray(i);
+            let [ox, oy, oz] = ray.origin;
+            let [dx, dy, dz] = ray.dir;
+            // 0 times infinity or NaN is NaN, and a sum of NaN is NaN.
+            let is_finite =
+                (ox * 0.0 + oy * 0.0 + oz * 0.0) + (dx * 0.0 + dy * 0.0 + dz * 0.0) == 0.0;
+            let has_range = !ray.t_min.is_nan() && !ray.t_max.is_nan();
+            if !is_finite || ray.dir == [0.0; 3] || !has_range {
+                invalid = invalid.and(Invalid { count: 1, first: i });
+            }
+            ray
+        }));
+        invalid
+    }
+}
+
+/// Entry `i` of an array with one entry a ray, or with one for all.
+#[inline(always)]
+pub fn one<T: Copy>(values: &[T], i: usize) -> T {
+    values[if values.len() == 1 { 0 } else { i }]
+}
+
+#[inline(always)]
+fn three(values: &[f32], i: usize) -> [f32; 3] {
+    let at = if values.len() == 3 { 0 } else { 3 * i };
+    [values[at], values[at + 1], values[at + 2]]
+}

@@ -1,0 +1,134 @@
+"""What users give, as contiguous arrays that the extension module takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ._errors import ArgumentError, ArgumentTypeError
+
+#: Any numeric array: NumPy's, nested sequences, or what has DLPack, the array interface or the
+#: buffer protocol (torch CPU tensors do).
+ArrayLike = Any
+
+
+def as_array(value: ArrayLike, argument: str) -> np.ndarray:
+    """A NumPy array that shares memory with ``value`` where that is possible."""
+    if not isinstance(value, np.ndarray):
+        has_array = hasattr(value, "__array__") or hasattr(value, "__array_interface__")
+        try:
+            if hasattr(value, "__dlpack__") and not has_array:
+                value = np.from_dlpack(value)
+            else:
+                value = np.asarray(value)
+        except Exception as error:
+            raise ArgumentTypeError(
+                f"{argument}: expected a numeric array in the memory of the CPU, found "
+                f"{type(value).__name__} ({error})",
+                argument,
+            ) from error
+    if value.dtype.kind not in "fiu":
+        raise ArgumentTypeError(
+            f"{argument}: expected an array of real numbers, found dtype {value.dtype}", argument
+        )
+    return value
+
+
+def as_float32(array: np.ndarray) -> np.ndarray:
+    """Rounded to float32, C-contiguous and aligned; the array itself where it is so already.
+
+    Numbers beyond float32 become infinite, which the caller refuses or counts.
+    """
+    if array.dtype == np.float32 and array.dtype.isnative:
+        return np.require(array, requirements=("C", "A"))
+    with np.errstate(over="ignore", under="ignore"):
+        return np.require(array, dtype=np.float32, requirements=("C", "A"))
+
+
+def as_points(value: ArrayLike, argument: str) -> np.ndarray:
+    """An array of shape (..., 3)."""
+    array = as_array(value, argument)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise ArgumentError(
+            f"{argument}: expected an array of shape (..., 3), found {array.shape}", argument
+        )
+    return array
+
+
+def as_rows(value: ArrayLike, argument: str) -> np.ndarray:
+    """An array of shape (N, 3); an empty sequence is (0, 3)."""
+    array = as_array(value, argument)
+    if array.shape == (0,):
+        array = array.reshape(0, 3)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ArgumentError(
+            f"{argument}: expected an array of shape (N, 3), found {array.shape}", argument
+        )
+    return array
+
+
+def as_integer(value: Any, argument: str, low: int, high: int) -> int:
+    """An integer from ``low`` to ``high``."""
+    try:
+        number = value.__index__()
+    except AttributeError:
+        raise ArgumentTypeError(
+            f"{argument}: expected an integer, found {type(value).__name__}", argument
+        ) from None
+    if not low <= number <= high:
+        raise ArgumentError(f"{argument}: expected {low} to {high}, found {number}", argument)
+    return int(number)
+
+
+def as_faces(value: ArrayLike, argument: str, vertices: int) -> np.ndarray:
+    """Faces as uint32, every index checked before it is narrowed."""
+    faces = as_rows(value, argument)
+    if faces.size == 0:
+        return np.empty((0, 3), np.uint32)
+    if faces.dtype.kind == "f":
+        raise ArgumentTypeError(
+            f"{argument}: expected integers, found dtype {faces.dtype}", argument
+        )
+    if faces.min() < 0 or faces.max() >= vertices:
+        wrong = (faces < 0) | (faces >= vertices)
+        face = int(np.argmax(wrong.any(axis=1)))
+        found = int(faces[face][wrong[face]][0])
+        expected = f"expected 0 to {vertices - 1}" if vertices else "there are no vertices"
+        raise ArgumentError(f"{argument}[{face}] names vertex {found}; {expected}", argument, face)
+    if faces.dtype == np.int32 and faces.dtype.isnative and faces.flags.c_contiguous:
+        faces = faces.view(np.uint32)
+    return np.require(faces, dtype=np.uint32, requirements=("C", "A"))
+
+
+def as_masks(value: ArrayLike, argument: str) -> np.ndarray:
+    """Bit masks as uint32; negative numbers of 32 bits stand for their bits."""
+    array = as_array(value, argument)
+    if array.dtype.kind == "f" and array.size:
+        raise ArgumentTypeError(
+            f"{argument}: expected integers, found dtype {array.dtype}", argument
+        )
+    if array.size and array.dtype != np.uint32:
+        low, high = int(array.min()), int(array.max())
+        if low < -(2**31) or high >= 2**32:
+            wrong = low if low < -(2**31) else high
+            raise ArgumentError(f"{argument}: expected masks of 32 bits, found {wrong}", argument)
+        array = array.astype(np.uint32 if high > 2**31 - 1 and low >= 0 else np.int64)
+        array = array.astype(np.uint32)
+    return np.require(array, dtype=np.uint32, requirements=("C", "A"))
+
+
+def per_ray(array: np.ndarray, shape: tuple[int, ...], argument: str) -> np.ndarray:
+    """One entry for all rays, or one for each of ``shape``, as a flat array."""
+    if array.size == 1:
+        return array.reshape(1)
+    if array.shape == shape:
+        return array.reshape(-1)
+    try:
+        return np.ascontiguousarray(np.broadcast_to(array, shape)).reshape(-1)
+    except ValueError:
+        raise ArgumentError(
+            f"{argument}: expected a scalar or an array of the rays' shape {shape}, "
+            f"found {array.shape}",
+            argument,
+        ) from None

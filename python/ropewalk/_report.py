@@ -1,0 +1,101 @@
+"""What a build did."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from html import escape
+
+
+@dataclass(frozen=True)
+class Report:
+    """Figures of a scene's tree.
+
+    Predictions are those of the surface-area measure (MacDonald and Booth 1990) for a line that
+    crosses the scene's box and ends nowhere: a ray that hits something needs less.
+
+    >>> import ropewalk
+    >>> report = ropewalk.load("spd:tetra:3").report
+    >>> report.primitives, report.preset, report.tree_bytes > 0
+    (64, 'balanced', True)
+    """
+
+    #: Preset of the build.
+    preset: str
+    #: Number of meshes.
+    meshes: int
+    #: Number of primitives, degenerate ones included.
+    primitives: int
+    #: Primitives without area; they are kept and never hit.
+    degenerate: int
+    #: References to primitives in leaves.
+    references: int
+    #: References per primitive; 0 for an empty scene.
+    duplication: float
+    #: Inner nodes of the binary tree.
+    inner_nodes: int
+    #: Leaves, empty ones included.
+    leaves: int
+    #: Empty leaves.
+    empty_leaves: int
+    #: Depth of the deepest leaf; the root's is 0.
+    max_depth: int
+    #: Bytes of the tree, its own copy of the triangles included.
+    tree_bytes: int
+    #: Bytes of the primitives as given.
+    geometry_bytes: int
+    #: Inner nodes of the binary tree that a line visits; the wide tree takes up to three in a step.
+    predicted_steps: float
+    #: Leaves that a line visits.
+    predicted_leaves: float
+    #: Primitives that a line is tested against, one by one; blocks of eight are tested at once.
+    predicted_tests: float
+    #: Number of leaves by number of references; the last entry holds all larger ones.
+    leaf_sizes: list[int]
+    #: Seconds of the build by the clock.
+    seconds: float
+
+    @property
+    def bytes_per_primitive(self) -> float:
+        """Bytes of the tree per primitive; 0 for an empty scene."""
+        return self.tree_bytes / self.primitives if self.primitives else 0.0
+
+    def _rows(self) -> list[tuple[str, str]]:
+        return [
+            ("primitives", f"{self.primitives:,} in {plural(self.meshes, 'mesh', 'meshes')}"),
+            ("degenerate", f"{self.degenerate:,}"),
+            ("tree", f"{size_of(self.tree_bytes)}, {self.bytes_per_primitive:.0f} bytes a primitive"),
+            ("geometry", size_of(self.geometry_bytes)),
+            ("duplication", f"{self.duplication:.2f} references a primitive"),
+            ("leaves", f"{self.leaves:,}, {self.empty_leaves:,} of them empty"),
+            ("depth", str(self.max_depth)),
+            ("predicted for a line", f"{self.predicted_steps:.1f} steps, {self.predicted_tests:.1f} tests"),
+            ("build", f"{self.seconds:.3g} s, preset {self.preset}"),
+        ]
+
+    def __str__(self) -> str:
+        rows = self._rows()
+        width = max(len(name) for name, _ in rows)
+        return "\n".join(f"{name:{width}}  {value}" for name, value in rows)
+
+    def _repr_html_(self) -> str:
+        rows = (f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in self._rows())
+        return f"<table>{''.join(rows)}</table>"
+
+
+def report_of(figures: dict[str, object]) -> Report:
+    """The report of the extension module's figures."""
+    return Report(**{field.name: figures[field.name] for field in fields(Report)})  # type: ignore[arg-type]
+
+
+def plural(count: int, one: str, many: str) -> str:
+    """A number with its noun."""
+    return f"{count:,} {one if count == 1 else many}"
+
+
+def size_of(count: float) -> str:
+    """Bytes for people."""
+    for unit in ("bytes", "KiB", "MiB"):
+        if count < 1024:
+            return f"{count:.0f} {unit}" if unit == "bytes" else f"{count:.1f} {unit}"
+        count /= 1024
+    return f"{count:.2f} GiB"

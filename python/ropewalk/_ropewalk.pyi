@@ -1,0 +1,85 @@
+"""The extension module. Everything in it but the two functions is private to the package."""
+
+from collections.abc import Callable
+from typing import Literal, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+def simd_level() -> Literal["scalar", "avx2", "avx512"]: ...
+def default_threads() -> int: ...
+
+_F32 = NDArray[np.float32]
+_I32 = NDArray[np.int32]
+_I64 = NDArray[np.int64]
+_U32 = NDArray[np.uint32]
+_State = tuple[NDArray[np.uint8], NDArray[np.uint64], _F32, list[int], list[int], str]
+
+@final
+class Rays:
+    def __new__(
+        cls,
+        count: int,
+        origins: _F32,
+        directions: _F32,
+        t_min: _F32,
+        t_max: _F32,
+        masks: _U32 | None = None,
+        skip: _I32 | None = None,
+    ) -> Rays: ...
+    def __len__(self) -> int: ...
+    def first_invalid(self) -> int | None: ...
+
+@final
+class Core:
+    @staticmethod
+    def build(
+        vertices: list[_F32],
+        faces: list[_U32],
+        masks: list[int],
+        preset: str,
+        threads: int,
+        progress: Callable[[float], object] | None = None,
+    ) -> Core: ...
+    @staticmethod
+    def load(
+        path: str,
+        preset: str,
+        threads: int,
+        progress: Callable[[float], object] | None = None,
+    ) -> Core: ...
+    @staticmethod
+    def from_state(
+        kinds: NDArray[np.uint8],
+        ends: NDArray[np.uint64],
+        numbers: _F32,
+        starts: list[int],
+        masks: list[int],
+        preset: str,
+        threads: int,
+    ) -> Core: ...
+    def state(self) -> _State: ...
+    @property
+    def starts(self) -> list[int]: ...
+    @property
+    def masks(self) -> list[int]: ...
+    @property
+    def bounds(self) -> tuple[list[float], list[float]] | None: ...
+    def report(self) -> dict[str, object]: ...
+    def closest_hit(self, rays: Rays, threads: int) -> tuple[_F32, _I32, _I32, int, int]: ...
+    def occluded(self, rays: Rays, threads: int) -> tuple[NDArray[np.bool_], int, int]: ...
+    def count_hits(self, rays: Rays, threads: int) -> tuple[_I32, int, int]: ...
+    def first_hits(
+        self, rays: Rays, threads: int, k: int | None = None
+    ) -> tuple[_I64, _F32, _I32, _I32, int, int]: ...
+    def surface(
+        self,
+        what: str,
+        rays: Rays,
+        t: _F32,
+        prim: _I32,
+        geom: _I32,
+        threads: int,
+        ray: _I64 | None = None,
+    ) -> tuple[_F32, int]: ...
+    def engine_seconds(self, query: str, rays: Rays) -> float: ...

@@ -1,0 +1,654 @@
+"""Scenes: geometry, its tree, and the queries."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterable
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._arrays import (
+    ArrayLike,
+    as_array,
+    as_faces,
+    as_float32,
+    as_integer,
+    as_masks,
+    as_points,
+    as_rows,
+    per_ray,
+)
+from ._errors import (
+    ArgumentError,
+    ArgumentTypeError,
+    InvalidRayError,
+    InvalidRayWarning,
+    PrecisionWarning,
+)
+from ._hits import HitLists, Hits, make_hits, make_lists
+from ._report import Report, plural, report_of, size_of
+from ._ropewalk import Core, Rays, default_threads
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+#: Up to so many rays are answered on the calling thread: waking others would take longer.
+_FEW_RAYS = 2048
+
+#: The most threads that can be asked for.
+_MAX_THREADS = 1024
+
+#: Rounding by more than this share of the box's diagonal is warned of: 2^-25 is what rounding to
+#: float32 costs an object around the origin, this is an object 32 times its size away.
+_PRECISION = 2.0**-20
+
+_ALL_BITS = 0xFFFF_FFFF
+
+
+class Scene:
+    """Triangles that rays can be cast at. A scene never changes and can be used by many threads.
+
+    Args:
+        vertices: shape (V, 3), any numeric dtype, rounded to float32.
+        faces: shape (F, 3), integers from 0 to V - 1; face ``i`` is primitive ``i``.
+        preset: ``"fast"``, ``"balanced"`` or ``"best"``: how long to build for how fast a tree;
+            ``"compact"`` for a small one.
+        threads: threads of the build; 0 is one a processor that this process may use. The tree is the
+            same for any number.
+        progress: True for a bar (where tqdm is installed), or a function of the share done.
+
+    Faces without area are kept and never hit; both sides of others are. A scene without faces is
+    valid, and every ray misses it.
+
+    Raises:
+        ArgumentError: wrong shapes, vertices that are not finite, faces that name none.
+        ArgumentTypeError: arrays that are no real numbers, faces that are no integers.
+        OutOfMemoryError: the tree does not fit into memory.
+        KeyboardInterrupt: Ctrl-C stops a build within a fraction of a second.
+
+    >>> import ropewalk
+    >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> float(scene.closest_hit([0.2, 0.2, 1.0], [0, 0, -1]).t)
+    1.0
+    """
+
+    __slots__ = ("__weakref__", "_core", "_report", "_starts")
+
+    _core: Core
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        preset: str = "balanced",
+        threads: int = 0,
+        progress: bool | Callable[[float], object] | None = None,
+    ) -> None:
+        mesh = _mesh(vertices, faces, "")
+        self._adopt(_build([mesh], [_ALL_BITS], preset, threads, progress))
+
+    @classmethod
+    def from_meshes(
+        cls,
+        meshes: Iterable[tuple[ArrayLike, ArrayLike]],
+        *,
+        masks: ArrayLike | None = None,
+        preset: str = "balanced",
+        threads: int = 0,
+        progress: bool | Callable[[float], object] | None = None,
+    ) -> Scene:
+        """A scene of several meshes; hits name the mesh (``geom_id``) and the face in it (``prim_id``).
+
+        Args:
+            meshes: pairs of vertices (V, 3) and faces (F, 3), as for :class:`Scene`.
+            masks: 32 bits a mesh, all set by default. A ray hits a mesh if they have a bit in common.
+
+        Raises:
+            ArgumentError, ArgumentTypeError, OutOfMemoryError: as :class:`Scene`.
+
+        >>> import ropewalk
+        >>> a = ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> b = ([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2], [0, 2, 1]])
+        >>> scene = ropewalk.Scene.from_meshes([a, b], masks=[1, 2])
+        >>> scene.closest_hit([0.2, 0.2, 5], [0, 0, -1]).geom_id
+        array(1, dtype=int32)
+        >>> scene.closest_hit([0.2, 0.2, 5], [0, 0, -1], masks=1).geom_id
+        array(0, dtype=int32)
+        """
+        checked = []
+        try:
+            pairs = list(meshes)
+        except TypeError:
+            raise ArgumentTypeError(
+                f"meshes: expected pairs of arrays, found {type(meshes).__name__}", "meshes"
+            ) from None
+        for i, pair in enumerate(pairs):
+            try:
+                vertices, faces = pair
+            except (TypeError, ValueError):
+                raise ArgumentTypeError(
+                    f"meshes[{i}]: expected a pair (vertices, faces), found {type(pair).__name__}",
+                    "meshes",
+                    i,
+                ) from None
+            checked.append(_mesh(vertices, faces, f"meshes[{i}]."))
+        bits = [_ALL_BITS] * len(checked)
+        if masks is not None:
+            bits = as_masks(masks, "masks").tolist()
+            if not isinstance(bits, list) or len(bits) != len(checked):
+                raise ArgumentError(
+                    f"masks: expected {len(checked)} masks, one a mesh, found {bits}", "masks"
+                )
+        scene = cls.__new__(cls)
+        scene._adopt(_build(checked, bits, preset, threads, progress))
+        return scene
+
+    def _adopt(self, core: Core) -> None:
+        self._core = core
+        self._starts = np.asarray(core.starts, np.int64)
+        self._report: Report | None = None
+
+    # Queries ----------------------------------------------------------------------------------
+
+    def closest_hit(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        *,
+        masks: ArrayLike | None = None,
+        skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        threads: int = 0,
+        strict: bool = False,
+    ) -> Hits:
+        """The nearest hit of each ray.
+
+        Args:
+            origins: shape (..., 3), any numeric dtype, rounded to float32. Contiguous float32 arrays
+                are read where they are.
+            directions: shape (..., 3), of any length but 0; shapes broadcast, so that one origin
+                serves many directions.
+            t_min: smallest accepted parameter, in lengths of the direction: a number, or one a ray.
+            t_max: largest accepted parameter; both ends are included.
+            masks: 32 bits for all rays or a ray; see :meth:`from_meshes`.
+            skip: a primitive that each ray ignores, usually the one that it leaves: ``prim_id`` of a
+                scene of one mesh, a pair ``(prim_id, geom_id)``, or the :class:`Hits` that the rays
+                start at. -1 ignores nothing.
+            threads: threads of this call; 0 is one a processor that this process may use.
+            strict: refuse rays that can hit nothing, instead of counting them in a warning.
+
+        Of hits at equal ``t`` the answer is the one with the lowest ``geom_id``, then ``prim_id``.
+        A ray whose ``t_min`` exceeds its ``t_max``, and one that is NaN, infinite or without
+        direction, misses. Arrays must not be written to while a query runs.
+
+        Raises:
+            ArgumentError: shapes that do not fit each other.
+            ArgumentTypeError: arrays that are no real numbers.
+            InvalidRayError: with ``strict``, the first such ray.
+            KeyboardInterrupt: Ctrl-C stops a query within a fraction of a second.
+
+        The tree is walked after Havran (1997), many rays at a time; triangles are tested after Woop,
+        Benthin and Wald (2013), so that no ray passes between two that share an edge.
+
+        >>> import ropewalk
+        >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> scene.closest_hit([[0.2, 0.2, 1], [0.2, 0.2, -1]], [0, 0, 1]).t
+        array([inf,  1.], dtype=float32)
+        >>> bool(scene.closest_hit([0.2, 0.2, -1], [0, 0, 1], t_max=0.5).hit)
+        False
+        """
+        rays, shape, threads = self._rays(
+            origins, directions, t_min, t_max, masks, skip, threads, strict
+        )
+        *arrays, invalid, first = self._core.closest_hit(rays, threads)
+        _warn(invalid, first)
+        return make_hits(self._core, rays, threads, shape, tuple(arrays))
+
+    def occluded(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        *,
+        masks: ArrayLike | None = None,
+        skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        threads: int = 0,
+        strict: bool = False,
+    ) -> NDArray[np.bool_]:
+        """Whether each ray hits anything: bool, in the rays' shape.
+
+        Arguments and errors are those of :meth:`closest_hit`; it agrees with ``closest_hit(...).hit``.
+
+        >>> import ropewalk
+        >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+        >>> scene.occluded([[0.2, 0.2, 1], [2, 2, 1]], [0, 0, -1])
+        array([ True, False])
+        """
+        rays, shape, threads = self._rays(
+            origins, directions, t_min, t_max, masks, skip, threads, strict
+        )
+        hit, invalid, first = self._core.occluded(rays, threads)
+        _warn(invalid, first)
+        return hit.reshape(shape)
+
+    def all_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        *,
+        masks: ArrayLike | None = None,
+        skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        threads: int = 0,
+        strict: bool = False,
+    ) -> HitLists:
+        """Every hit of each ray, in order, each once.
+
+        Arguments and errors are those of :meth:`closest_hit`.
+
+        Raises:
+            OutOfMemoryError: the hits do not fit into memory; :meth:`count_hits` says how many there
+                are.
+
+        >>> import ropewalk
+        >>> v = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]
+        >>> scene = ropewalk.Scene(v, [[0, 1, 2], [3, 4, 5]])
+        >>> scene.all_hits([0.2, 0.2, -1], [0, 0, 1]).t
+        array([1., 2.], dtype=float32)
+        """
+        return self._lists(
+            None, origins, directions, t_min, t_max, masks, skip, threads, strict
+        )
+
+    def first_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        k: int,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        *,
+        masks: ArrayLike | None = None,
+        skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        threads: int = 0,
+        strict: bool = False,
+    ) -> HitLists:
+        """The first ``k`` hits of each ray, in order, each once: the beginnings of :meth:`all_hits`.
+
+        Arguments and errors are those of :meth:`closest_hit`; ``k`` is 0 or more.
+
+        >>> import ropewalk
+        >>> v = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]]
+        >>> scene = ropewalk.Scene(v, [[0, 1, 2], [3, 4, 5]])
+        >>> scene.first_hits([0.2, 0.2, -1], [0, 0, 1], 1).t
+        array([1.], dtype=float32)
+        """
+        k = as_integer(k, "k", 0, 2**63 - 1)
+        return self._lists(k, origins, directions, t_min, t_max, masks, skip, threads, strict)
+
+    def count_hits(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike = 0.0,
+        t_max: ArrayLike = np.inf,
+        *,
+        masks: ArrayLike | None = None,
+        skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        threads: int = 0,
+        strict: bool = False,
+    ) -> NDArray[np.int32]:
+        """The number of primitives that each ray hits: int32, in the rays' shape.
+
+        Arguments and errors are those of :meth:`closest_hit`; it agrees with ``all_hits(...).counts``.
+
+        >>> import ropewalk
+        >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]])
+        >>> scene.count_hits([[0.2, 0.2, 1], [2, 2, 1]], [0, 0, -1])
+        array([2, 0], dtype=int32)
+        """
+        rays, shape, threads = self._rays(
+            origins, directions, t_min, t_max, masks, skip, threads, strict
+        )
+        counts, invalid, first = self._core.count_hits(rays, threads)
+        _warn(invalid, first)
+        return counts.reshape(shape)
+
+    def _lists(
+        self,
+        k: int | None,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike,
+        t_max: ArrayLike,
+        masks: ArrayLike | None,
+        skip: Any,
+        threads: int,
+        strict: bool,
+    ) -> HitLists:
+        rays, shape, threads = self._rays(
+            origins, directions, t_min, t_max, masks, skip, threads, strict
+        )
+        *arrays, invalid, first = self._core.first_hits(rays, threads, k)
+        _warn(invalid, first, stacklevel=4)
+        return make_lists(self._core, rays, threads, shape, tuple(arrays))
+
+    def _rays(
+        self,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        t_min: ArrayLike,
+        t_max: ArrayLike,
+        masks: ArrayLike | None,
+        skip: Any,
+        threads: int,
+        strict: bool,
+    ) -> tuple[Rays, tuple[int, ...], int]:
+        o, d = as_points(origins, "origins"), as_points(directions, "directions")
+        try:
+            shape = np.broadcast_shapes(o.shape[:-1], d.shape[:-1])
+        except ValueError:
+            raise ArgumentError(
+                f"directions: expected a shape that fits that of origins, {o.shape}; "
+                f"found {d.shape}",
+                "directions",
+            ) from None
+        count = 1
+        for length in shape:
+            count *= length
+        rays = Rays(
+            count,
+            _points(o, shape),
+            _points(d, shape),
+            as_float32(per_ray(as_array(t_min, "t_min"), shape, "t_min")),
+            as_float32(per_ray(as_array(t_max, "t_max"), shape, "t_max")),
+            None if masks is None else per_ray(as_masks(masks, "masks"), shape, "masks"),
+            None if skip is None else self._skip(skip, shape),
+        )
+        if strict and (index := rays.first_invalid()) is not None:
+            reason = _why(o, d, t_min, t_max, shape, index)
+            raise InvalidRayError(f"ray {index} can hit nothing: {reason}", "rays", index)
+        threads = _threads(threads)
+        return rays, shape, 1 if count <= _FEW_RAYS else threads
+
+    def _skip(self, skip: Any, shape: tuple[int, ...]) -> NDArray[np.int32]:
+        """Primitives to ignore, numbered through all meshes; -1 for none."""
+        geometry: np.ndarray | None = None
+        if isinstance(skip, Hits):
+            primitive, geometry = skip.prim_id, skip.geom_id
+        elif isinstance(skip, tuple) and len(skip) == 2:
+            primitive, geometry = as_array(skip[0], "skip[0]"), as_array(skip[1], "skip[1]")
+        else:
+            primitive = as_array(skip, "skip")
+        if len(self._starts) != 2 and geometry is None and np.any(primitive >= 0):
+            raise ArgumentError(
+                f"skip: expected a pair (prim_id, geom_id), since the scene has "
+                f"{len(self._starts) - 1} meshes; found primitives alone",
+                "skip",
+            )
+        if geometry is None:
+            geometry = np.where(primitive < 0, -1, 0)
+        for name, array in (("skip", primitive), ("skip", geometry)):
+            if array.dtype.kind == "f" and array.size:
+                raise ArgumentTypeError(
+                    f"{name}: expected integers, found dtype {array.dtype}", name
+                )
+        try:
+            primitive, geometry = np.broadcast_arrays(primitive, geometry)
+        except ValueError:
+            raise ArgumentError(
+                f"skip: expected shapes that fit each other, found {primitive.shape} and "
+                f"{geometry.shape}",
+                "skip",
+            ) from None
+        sizes = np.diff(self._starts)
+        none = (primitive < 0) | (geometry < 0)
+        known = geometry < len(sizes)
+        mesh = np.where(none | ~known, 0, geometry).astype(np.int64)
+        if len(sizes):
+            known &= primitive < sizes[mesh]
+        wrong = ~none & ~known
+        if wrong.any():
+            index = int(np.argmax(wrong.reshape(-1)))
+            raise ArgumentError(
+                f"skip: primitive {primitive.reshape(-1)[index]} of mesh "
+                f"{geometry.reshape(-1)[index]} is not in the scene (ray {index})",
+                "skip",
+                index,
+            )
+        numbered = np.where(none, -1, self._starts[mesh] + np.where(none, 0, primitive))
+        return per_ray(numbered.astype(np.int32), shape, "skip")
+
+    # The scene --------------------------------------------------------------------------------
+
+    @property
+    def report(self) -> Report:
+        """Figures of the build and of the tree.
+
+        >>> import ropewalk
+        >>> ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).report.leaves
+        1
+        """
+        if self._report is None:
+            self._report = report_of(self._core.report())
+        return self._report
+
+    @property
+    def bounds(self) -> NDArray[np.float32]:
+        """Lower and upper corner of the box of all primitives, shape (2, 3); NaN without any.
+
+        >>> import ropewalk
+        >>> ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).bounds
+        array([[0., 0., 0.],
+               [1., 1., 0.]], dtype=float32)
+        """
+        bounds = self._core.bounds
+        return np.full((2, 3), np.nan, np.float32) if bounds is None else np.float32(bounds)
+
+    @property
+    def mesh_sizes(self) -> NDArray[np.int64]:
+        """Number of primitives of each mesh.
+
+        >>> import ropewalk
+        >>> ropewalk.load("spd:tetra:2").mesh_sizes
+        array([16])
+        """
+        return np.diff(self._starts)
+
+    @property
+    def masks(self) -> NDArray[np.uint32]:
+        """Mask of each mesh.
+
+        >>> import ropewalk
+        >>> ropewalk.load("spd:tetra:2").masks
+        array([4294967295], dtype=uint32)
+        """
+        return np.asarray(self._core.masks, np.uint32)
+
+    def __len__(self) -> int:
+        """Number of primitives."""
+        return int(self._starts[-1])
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __repr__(self) -> str:
+        count, meshes = len(self), len(self._starts) - 1
+        if not count:
+            return f"<ropewalk.Scene without primitives, {plural(meshes, 'mesh', 'meshes')}>"
+        low, high = (", ".join(f"{x:.6g}" for x in corner) for corner in self.bounds)
+        return (
+            f"<ropewalk.Scene of {plural(count, 'primitive', 'primitives')} in "
+            f"{plural(meshes, 'mesh', 'meshes')}, box ({low}) to ({high}), "
+            f"tree {size_of(self.report.tree_bytes)}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the report as a table."""
+        return f"<b>ropewalk.Scene</b>{self.report._repr_html_()}"
+
+    def __copy__(self) -> Scene:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
+        return self
+
+    def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
+        """Pickled as its primitives; the same tree is built again."""
+        return _restore, (type(self), *self._core.state())
+
+
+def load(
+    path: str | os.PathLike[str],
+    *,
+    preset: str = "balanced",
+    threads: int = 0,
+    progress: bool | Callable[[float], object] | None = None,
+) -> Scene:
+    """Loads a scene: an NFF file, gzipped or not, or a built-in one, ``"spd:NAME"`` or
+    ``"spd:NAME:SIZE"`` of the Standard Procedural Databases (Haines 1987).
+
+    Object ``i`` of the file is primitive ``i`` of one mesh, hit on both sides; polygons, spheres,
+    cones and patches stay what they are. Coordinates are rounded to float32. The other arguments are
+    those of :class:`Scene`.
+
+    Raises:
+        SceneNotFoundError: the file cannot be opened.
+        SceneFileError: its content is wrong; the message has line and column.
+
+    >>> import ropewalk
+    >>> ropewalk.load("spd:balls:2")
+    <ropewalk.Scene of 92 primitives in 1 mesh, box (-12, -12, -0.5) to (12, 12, 0.785072), tree 6.4 KiB>
+    """
+    try:
+        name = os.fsdecode(path)
+        name.encode()
+    except (TypeError, UnicodeError) as error:
+        raise ArgumentTypeError(
+            f"path: expected a path that is valid Unicode, found {path!r} ({error})", "path"
+        ) from None
+    with _progress(progress) as show:
+        core = Core.load(name, _preset(preset), _threads(threads), show)
+    scene = Scene.__new__(Scene)
+    scene._adopt(core)
+    return scene
+
+
+def _restore(kind: type[Scene], *state: Any) -> Scene:
+    scene = kind.__new__(kind)
+    scene._adopt(Core.from_state(*state, default_threads()))
+    return scene
+
+
+def _build(
+    meshes: list[tuple[np.ndarray, np.ndarray]],
+    masks: list[int],
+    preset: str,
+    threads: int,
+    progress: bool | Callable[[float], object] | None,
+) -> Core:
+    with _progress(progress) as show:
+        vertices, faces = [mesh[0] for mesh in meshes], [mesh[1] for mesh in meshes]
+        return Core.build(vertices, faces, masks, _preset(preset), _threads(threads), show)
+
+
+def _preset(preset: str) -> str:
+    if not isinstance(preset, str):
+        raise ArgumentTypeError(
+            f"preset: expected a string, found {type(preset).__name__}", "preset"
+        )
+    return preset
+
+
+def _threads(threads: int) -> int:
+    return as_integer(threads, "threads", 0, _MAX_THREADS) or default_threads()
+
+
+def _mesh(vertices: ArrayLike, faces: ArrayLike, name: str) -> tuple[np.ndarray, np.ndarray]:
+    given = as_rows(vertices, f"{name}vertices")
+    rounded = as_float32(given)
+    if rounded is not given and given.dtype.itemsize > 2 and given.dtype != np.float32:
+        _check_precision(given, rounded, name)
+    return rounded, as_faces(faces, f"{name}faces", len(rounded))
+
+
+def _check_precision(given: np.ndarray, rounded: np.ndarray, name: str) -> None:
+    """Warns where rounding shows beside the size of the mesh; bit by bit, to spare memory."""
+    if not len(given) or not np.isfinite(rounded).all():
+        return
+    span = rounded.max(axis=0).astype(np.float64) - rounded.min(axis=0)
+    diagonal = float(np.linalg.norm(span))
+    step, worst = 1 << 16, 0.0
+    for start in range(0, len(given), step):
+        part = slice(start, start + step)
+        worst = max(worst, float(np.abs(given[part] - rounded[part].astype(np.float64)).max()))
+    if worst > _PRECISION * diagonal:
+        warnings.warn(
+            f"{name}vertices: rounding to float32 moves vertices by up to {worst:.3g}, where the "
+            f"diagonal of all is {diagonal:.3g}; move the mesh and the rays near the origin",
+            PrecisionWarning,
+            stacklevel=4,
+        )
+
+
+def _points(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Coordinates of one point for all rays or of one a ray, flat."""
+    if array.shape[:-1] != shape and array.size != 3:
+        array = np.broadcast_to(array, (*shape, 3))
+    return as_float32(array).reshape(-1)
+
+
+def _warn(invalid: int, first: int, stacklevel: int = 3) -> None:
+    if invalid:
+        warnings.warn(
+            f"{invalid} rays have NaN or infinite numbers or no direction and miss; the first is "
+            f"ray {first}",
+            InvalidRayWarning,
+            stacklevel=stacklevel,
+        )
+
+
+def _why(
+    o: np.ndarray, d: np.ndarray, t_min: ArrayLike, t_max: ArrayLike, shape: tuple[int, ...], i: int
+) -> str:
+    origin = as_float32(np.broadcast_to(o, (*shape, 3)).reshape(-1, 3)[i])
+    direction = as_float32(np.broadcast_to(d, (*shape, 3)).reshape(-1, 3)[i])
+    low = as_float32(np.broadcast_to(np.asarray(t_min), shape).reshape(-1)[i])
+    high = as_float32(np.broadcast_to(np.asarray(t_max), shape).reshape(-1)[i])
+    if not np.isfinite(origin).all():
+        return f"its origin is {origin}; expected finite numbers within the range of float32"
+    if not np.isfinite(direction).all():
+        return f"its direction is {direction}; expected finite numbers within the range of float32"
+    if not direction.any():
+        return "its direction is zero in float32; expected any other length"
+    return f"its range is {low} to {high}; expected t_min <= t_max"
+
+
+@contextmanager
+def _progress(
+    progress: bool | Callable[[float], object] | None,
+) -> Iterator[Callable[[float], object] | None]:
+    """A function of the share done: the caller's, that of a bar, or None."""
+    if progress is None or progress is False:
+        yield None
+        return
+    if callable(progress):
+        yield progress
+        return
+    try:
+        from tqdm.auto import tqdm
+    except ImportError:
+        yield None
+        return
+    bar_format = "{l_bar}{bar}| {elapsed}<{remaining}"
+    with tqdm(total=1.0, desc="ropewalk", bar_format=bar_format) as bar:
+        yield lambda share: bar.update(max(0.0, share - bar.n))
