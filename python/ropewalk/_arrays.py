@@ -15,24 +15,27 @@ ArrayLike = Any
 
 def as_array(value: ArrayLike, argument: str) -> np.ndarray:
     """A NumPy array that shares memory with ``value`` where that is possible."""
-    if not isinstance(value, np.ndarray):
+    array: np.ndarray
+    if isinstance(value, np.ndarray):
+        array = value
+    else:
         has_array = hasattr(value, "__array__") or hasattr(value, "__array_interface__")
         try:
             if hasattr(value, "__dlpack__") and not has_array:
-                value = np.from_dlpack(value)
+                array = np.from_dlpack(value)
             else:
-                value = np.asarray(value)
+                array = np.asarray(value)
         except Exception as error:
             raise ArgumentTypeError(
                 f"{argument}: expected a numeric array in the memory of the CPU, found "
                 f"{type(value).__name__} ({error})",
                 argument,
             ) from error
-    if value.dtype.kind not in "fiu":
+    if array.dtype.kind not in "fiu":
         raise ArgumentTypeError(
-            f"{argument}: expected an array of real numbers, found dtype {value.dtype}", argument
+            f"{argument}: expected an array of real numbers, found dtype {array.dtype}", argument
         )
-    return value
+    return array
 
 
 def as_float32(array: np.ndarray) -> np.ndarray:

@@ -26,18 +26,20 @@ class _Surface:
     geom_id: NDArray[np.int32]
     _core: Core | None
     _rays: Rays | None
+    _threads: int
 
     def _ray_ids(self) -> NDArray[np.int64] | None:
         return None
 
     def _look(self, what: str) -> NDArray[np.float32]:
-        kept = getattr(self, f"_{what}", None)
+        kept: NDArray[np.float32] | None = getattr(self, f"_{what}", None)
         if kept is not None:
             return kept
         assert self._core is not None and self._rays is not None
-        flat = (self.t.reshape(-1), self.prim_id.reshape(-1), self.geom_id.reshape(-1))
-        flat = tuple(np.ascontiguousarray(array) for array in flat)
-        values, lost = self._core.surface(what, self._rays, *flat, self._threads, self._ray_ids())
+        t, prim, geom = np.ravel(self.t), np.ravel(self.prim_id), np.ravel(self.geom_id)
+        values, lost = self._core.surface(
+            what, self._rays, t, prim, geom, self._threads, self._ray_ids()
+        )
         if lost:
             raise RopewalkError(
                 f"{lost} of the hits are not on their rays any more: origins, directions or results "
@@ -166,7 +168,7 @@ class HitLists(_Surface):
     @property
     def ray_id(self) -> NDArray[np.int64]:
         """Ray of each hit, counted in C order; made when first asked for."""
-        kept = getattr(self, "_ray_id", None)
+        kept: NDArray[np.int64] | None = getattr(self, "_ray_id", None)
         if kept is None:
             rays = np.arange(len(self.offsets) - 1, dtype=np.int64)
             kept = self._ray_id = np.repeat(rays, np.diff(self.offsets))

@@ -207,9 +207,9 @@ class Scene:
         rays, shape, threads = self._rays(
             origins, directions, t_min, t_max, masks, skip, threads, strict
         )
-        *arrays, invalid, first = self._core.closest_hit(rays, threads)
+        t, prim, geom, invalid, first = self._core.closest_hit(rays, threads)
         _warn(invalid, first)
-        return make_hits(self._core, rays, threads, shape, tuple(arrays))
+        return make_hits(self._core, rays, threads, shape, (t, prim, geom))
 
     def occluded(
         self,
@@ -338,9 +338,9 @@ class Scene:
         rays, shape, threads = self._rays(
             origins, directions, t_min, t_max, masks, skip, threads, strict
         )
-        *arrays, invalid, first = self._core.first_hits(rays, threads, k)
+        offsets, t, prim, geom, invalid, first = self._core.first_hits(rays, threads, k)
         _warn(invalid, first, stacklevel=4)
-        return make_lists(self._core, rays, threads, shape, tuple(arrays))
+        return make_lists(self._core, rays, threads, shape, (offsets, t, prim, geom))
 
     def _rays(
         self,
@@ -452,7 +452,7 @@ class Scene:
                [1., 1., 0.]], dtype=float32)
         """
         bounds = self._core.bounds
-        return np.full((2, 3), np.nan, np.float32) if bounds is None else np.float32(bounds)
+        return np.full((2, 3), np.nan, np.float32) if bounds is None else np.array(bounds, np.float32)
 
     @property
     def mesh_sizes(self) -> NDArray[np.int64]:
@@ -543,9 +543,18 @@ def load(
     return scene
 
 
-def _restore(kind: type[Scene], *state: Any) -> Scene:
+def _restore(
+    kind: type[Scene],
+    kinds: NDArray[np.uint8],
+    ends: NDArray[np.uint64],
+    numbers: NDArray[np.float32],
+    starts: list[int],
+    masks: list[int],
+    preset: str,
+) -> Scene:
     scene = kind.__new__(kind)
-    scene._adopt(Core.from_state(*state, default_threads()))
+    threads = default_threads()
+    scene._adopt(Core.from_state(kinds, ends, numbers, starts, masks, preset, threads))
     return scene
 
 
@@ -645,7 +654,7 @@ def _progress(
         yield progress
         return
     try:
-        from tqdm.auto import tqdm
+        from tqdm.auto import tqdm  # type: ignore[import-untyped]
     except ImportError:
         yield None
         return

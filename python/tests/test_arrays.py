@@ -1,6 +1,7 @@
 """What may be given: dtypes, layouts, shapes, and arrays of others."""
 
 import array
+import os
 import sys
 
 import numpy as np
@@ -200,3 +201,24 @@ def test_surface_data_of_rays_that_were_written_to_is_refused():
     o += 1
     with pytest.raises(ropewalk.RopewalkError, match="written to"):
         hits.position
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/clear_refs"), reason="reads peaks from /proc")
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_query_needs_no_memory_but_its_results(threads):
+    count = 2_000_000
+    o = np.tile(ORIGINS, (count // 600, 1))
+    d = np.tile(DIRECTIONS, (count // 600, 1))
+    SCENE.closest_hit(o[:100_000], d[:100_000], threads=threads)
+
+    def status(name):
+        with open("/proc/self/status") as lines:
+            return next(int(line.split()[1]) for line in lines if line.startswith(name)) * 1024
+
+    with open("/proc/self/clear_refs", "w") as file:
+        file.write("5")  # forgets the peak
+    before = status("VmRSS")
+    hits = SCENE.closest_hit(o, d, threads=threads)
+    more = status("VmHWM") - before
+    results = hits.t.nbytes + hits.prim_id.nbytes + hits.geom_id.nbytes
+    assert more < results + 8_000_000, "rays interleaved would be 64 MB"
