@@ -64,4 +64,4 @@ bench-python: tools ## Rays per second through Python against embreex and other 
 	@scripts/bench-python
 
 clean: ## Remove everything made here
-	@rm -rf $(OUT) target .venv-python
+	@rm -rf $(OUT) target .venv-python .venv-bench-python
