@@ -7,6 +7,7 @@
 mod brute_force;
 mod cells;
 mod expansion;
+mod order;
 mod queries;
 mod side;
 mod winding;

@@ -1,8 +1,9 @@
 //! Batches of points over a wide tree.
 
-use super::Side;
 use super::brute_force::{PointBruteForce, closest};
 use super::cells::{self, Cell};
+use super::order::along_curve;
+use super::{ClosestPoint, Side};
 use crate::aabb::Aabb;
 use crate::geometry::Geometry;
 use crate::kernel::point::{self, Found};
@@ -12,6 +13,12 @@ use rayon::prelude::*;
 
 /// Points that one task of a parallel batch answers.
 const TASK: usize = 1024;
+
+/// Fewer points than these are answered as they come.
+const SORTED_FROM: usize = 32;
+
+/// Points that are put in order together.
+const SORTED: usize = 1 << 20;
 
 /// Points for which all triangles are gone through that one task answers.
 const FULL_TASK: usize = 4;
@@ -41,7 +48,8 @@ pub enum PointError {
 /// Points with a NaN or infinite coordinate or one beyond [`LARGEST`](super::LARGEST) have no answer:
 /// NaN, no primitive, outside. Triangles without area are never the nearest and never crossed, and on
 /// which side a triangle can be hit does not matter. Answers are those of [`PointBruteForce`] bit for
-/// bit at every [`Level`] and with any number of threads.
+/// bit at every [`Level`], in any order, and with any number of threads. Batches are answered along a curve
+/// through the tree's box, so points need no order of their own.
 #[derive(Clone, Copy)]
 pub struct PointQueries<'a> {
     tree: &'a WideTree,
@@ -79,25 +87,30 @@ impl<'a> PointQueries<'a> {
 
     /// The nearest triangle of each point and the nearest point of it.
     pub fn closest_point(&self, points: &[[f64; 3]]) -> ClosestPoints {
-        let found = self.found(points);
-        let answer = |(point, found): (&[f64; 3], &Found)| {
-            if found.prim_id == u32::MAX {
-                return (found.distance2, (u32::MAX, [f64::NAN; 3]));
+        let nothing = ClosestPoint { distance: f64::NAN, prim_id: u32::MAX, point: [f64::NAN; 3] };
+        let all = self.in_order(points, nothing, |points, answers| {
+            let found = self.found(points);
+            for ((point, found), answer) in points.iter().zip(found).zip(answers) {
+                *answer = ClosestPoint { distance: found.distance2.sqrt(), ..nothing };
+                if found.prim_id != u32::MAX {
+                    *answer = closest(self.geometry, *point, found.distance2, found.prim_id);
+                }
             }
-            let nearest = closest(self.geometry, *point, found.distance2, found.prim_id);
-            (nearest.distance, (nearest.prim_id, nearest.point))
-        };
-        let (distance, (prim_id, point)) = if self.is_serial(points, TASK) {
-            points.iter().zip(&found).map(answer).unzip()
-        } else {
-            points.par_iter().zip(&found).with_min_len(TASK).map(answer).unzip()
-        };
-        ClosestPoints { distance, prim_id, point }
+        });
+        ClosestPoints {
+            distance: all.iter().map(|nearest| nearest.distance).collect(),
+            prim_id: all.iter().map(|nearest| nearest.prim_id).collect(),
+            point: all.iter().map(|nearest| nearest.point).collect(),
+        }
     }
 
     /// The distance of each point from the nearest triangle.
     pub fn distance(&self, points: &[[f64; 3]]) -> Vec<f64> {
-        self.found(points).iter().map(|found| found.distance2.sqrt()).collect()
+        self.in_order(points, f64::NAN, |points, distances| {
+            for (found, distance) in self.found(points).iter().zip(distances) {
+                *distance = found.distance2.sqrt();
+            }
+        })
     }
 
     /// On which side of a closed surface each point is: the ray along +z crosses it an odd number of
@@ -105,11 +118,9 @@ impl<'a> PointQueries<'a> {
     /// they lie, coincident triangles cancel, and which way triangles face does not matter. Of an open
     /// surface the answer holds for that direction only; see [`PointQueries::winding_number`].
     pub fn sides(&self, points: &[[f64; 3]]) -> Vec<Side> {
-        let mut sides = vec![Side::Outside; points.len()];
-        self.each(points, &mut sides, TASK, |points, sides| {
+        self.in_order(points, Side::Outside, |points, sides| {
             point::sides(self.level, self.tree, points, sides, &mut NoEvents);
-        });
-        sides
+        })
     }
 
     /// True for points inside of a closed surface or on it; see [`PointQueries::sides`].
@@ -176,12 +187,37 @@ impl<'a> PointQueries<'a> {
         events
     }
 
+    /// The nearest triangles, one point after the other.
     fn found(&self, points: &[[f64; 3]]) -> Vec<Found> {
         let mut found = vec![Found::INVALID; points.len()];
-        self.each(points, &mut found, TASK, |points, found| {
-            point::nearest(self.level, self.tree, points, found, &mut NoEvents);
-        });
+        point::nearest(self.level, self.tree, points, &mut found, &mut NoEvents);
         found
+    }
+
+    /// Puts points to `work` along a curve, and its answers where they belong.
+    fn in_order<T: Copy + Send>(
+        &self,
+        points: &[[f64; 3]],
+        nothing: T,
+        work: impl Fn(&[[f64; 3]], &mut [T]) + Sync,
+    ) -> Vec<T> {
+        let mut answers = vec![nothing; points.len()];
+        if points.len() < SORTED_FROM {
+            work(points, &mut answers);
+            return answers;
+        }
+        let mut found = vec![nothing; points.len().min(SORTED)];
+        for (points, answers) in points.chunks(SORTED).zip(answers.chunks_mut(SORTED)) {
+            let parallel = !self.is_serial(points, TASK);
+            let order = along_curve(points, self.tree.bounds(), parallel);
+            let sorted: Vec<[f64; 3]> = order.iter().map(|&i| points[i as usize]).collect();
+            let found = &mut found[..points.len()];
+            self.each(&sorted, found, TASK, &work);
+            for (&i, found) in order.iter().zip(found) {
+                answers[i as usize] = *found;
+            }
+        }
+        answers
     }
 
     fn is_serial(&self, points: &[[f64; 3]], task: usize) -> bool {

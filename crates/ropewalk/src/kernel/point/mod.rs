@@ -1,18 +1,17 @@
 //! Walks of points over the wide tree: to the nearest triangle, and up a column.
 //!
 //! ```text
-//! nearest   down to the cell of the point, the other side of each plane put on the stack with its
-//!           distance if that may matter; then what is on the stack, the last first
-//! column    all cells that the ray from the point along +z touches
+//! nearest   depth first; of the children of a treelet those that hold primitives and are near enough go on
+//!           the stack with their distances along the axes, the nearest on top
+//! column    all cells that the ray from the point along +z touches, plane by plane
 //! ```
-//! Both go plane by plane: a point has no direction by which a treelet's children could be put in order
-//! at once. In a leaf, eight triangles at a time are looked at by their boxes first. What is found is
-//! defined without a tree in `triangle` and [`crate::point`]; brute force uses the same.
+//! In a leaf, eight triangles at a time are looked at by their boxes first. What is found is defined without a tree in `triangle` and [`crate::point`]; brute force uses the same.
 
 #![allow(unsafe_code)]
 
 mod column;
 mod nearest;
+mod step;
 pub mod triangle;
 
 pub use nearest::Found;

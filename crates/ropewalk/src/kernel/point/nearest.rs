@@ -2,13 +2,15 @@
 
 #![allow(unsafe_code)]
 
+use super::step::{Children, Place, PointSimd};
 use super::triangle::{box_distance2, distance2};
-use super::{BeamSimd, STACK};
 use crate::kernel::beam::Doubles;
 use crate::kernel::events::Events;
 use crate::kernel::exact::{At, place};
 use crate::point::is_near;
-use crate::wide::{BLOCK_LINES, Block, ID_MASK, LEAF, WIDTH, WideTree, code_line};
+use crate::wide::{
+    BLOCK_LINES, Block, ID_MASK, LEAF, MAX_WIDE_DEPTH, WIDTH, WideTree, code_line, code_offset,
+};
 
 /// The triangle nearest to a point.
 #[derive(Clone, Copy, Debug)]
@@ -32,8 +34,8 @@ impl Found {
 }
 
 /// A cell may be left out if it is farther away than the best triangle by this share of that
-/// distance and the scene's diagonal. A distance from a triangle is off by less than a quarter of
-/// 2^-46 of them (docs/numerics.md).
+/// distance and the scene's diagonal. A distance from a triangle is off by less than 2^-46 of them
+/// (docs/numerics.md).
 const SLACK: f64 = 1.0 / (1u64 << 44) as f64;
 
 /// The largest squared distance of a cell that may hold a triangle as near as the best one.
@@ -44,17 +46,29 @@ fn limit(distance2: f64, diagonal: f64) -> f64 {
     far * far
 }
 
-/// A cell to be visited: what is below a plane of a treelet.
+/// Relative error of a squared distance of a cell: a gap and its square are rounded to `f32`, three of
+/// them are added; twice over.
+const CELL_SLACK: f32 = 16.0 * f32::EPSILON / 2.0;
+
+/// The same limit for squared distances of cells in `f32`.
+#[inline(always)]
+fn cell_limit(farthest: f64) -> f32 {
+    // The smallest number, for what underflows.
+    (farthest as f32).next_up() * (1.0 + CELL_SLACK) + f32::MIN_POSITIVE
+}
+
+/// Cells that a walk may put on its stack: all children of each treelet on the path.
+const CELLS: usize = 8 * MAX_WIDE_DEPTH + 1;
+
+/// A cell to be visited.
 #[derive(Clone, Copy)]
 struct Entry {
-    /// Code of the treelet or leaf.
+    /// Squared distance along each axis.
+    along: [f32; 3],
+    /// Squared distance.
+    distance2: f32,
+    /// Code.
     code: u32,
-    /// The plane in heap order; 7 and more are the children.
-    heap: u32,
-    /// Squared distance of the cell.
-    distance2: f64,
-    /// Distance of the cell along each axis, with any sign.
-    offset: [f64; 4],
 }
 
 /// The nearest triangle of each point.
@@ -62,14 +76,14 @@ struct Entry {
 /// # Safety
 /// The machine must have the features of `L`, and the caller must enable them.
 #[inline(always)]
-pub unsafe fn nearest<L: BeamSimd, E: Events>(
+pub unsafe fn nearest<L: PointSimd, E: Events>(
     tree: &WideTree,
     points: &[[f64; 3]],
     found: &mut [Found],
     events: &mut E,
 ) {
     let diagonal = tree.bounds().diagonal();
-    let mut stack = [Entry { code: 0, heap: 0, distance2: 0.0, offset: [0.0; 4] }; STACK];
+    let mut stack = [Entry { along: [0.0; 3], distance2: 0.0, code: 0 }; CELLS];
     let mut seed = Found::NOTHING;
     for (point, out) in points.iter().zip(found) {
         if !is_near(point) {
@@ -87,12 +101,12 @@ pub unsafe fn nearest<L: BeamSimd, E: Events>(
 /// # Safety
 /// As for [`nearest`].
 #[inline(always)]
-unsafe fn walk<L: BeamSimd, E: Events>(
+unsafe fn walk<L: PointSimd, E: Events>(
     tree: &WideTree,
     point: [f64; 3],
     diagonal: f64,
     seed: Found,
-    stack: &mut [Entry; STACK],
+    stack: &mut [Entry; CELLS],
     events: &mut E,
 ) -> Found {
     let mut best = Found::NOTHING;
@@ -101,7 +115,6 @@ unsafe fn walk<L: BeamSimd, E: Events>(
     }
     events.ray();
     let lines = tree.lines();
-    let p = [point[0], point[1], point[2], 0.0];
     let mut farthest = f64::MAX;
     if seed.at != NONE {
         let (block, lane) = (lines.block(seed.at as usize / WIDTH), seed.at as usize % WIDTH);
@@ -110,58 +123,63 @@ unsafe fn walk<L: BeamSimd, E: Events>(
         best = Found { distance2, ..seed };
         farthest = limit(distance2, diagonal);
     }
-    let mut offset = [0.0; 4];
+    let mut near = cell_limit(farthest);
+    let mut along = [0.0; 3];
     for a in 0..3 {
         let (low, high) = (f64::from(tree.bounds().min[a]), f64::from(tree.bounds().max[a]));
-        offset[a] = (low - p[a]).max(0.0).max(p[a] - high);
+        let gap = (low - point[a]).max(0.0).max(point[a] - high) as f32;
+        along[a] = gap * gap;
     }
-    let mut cell = Entry { code: tree.root(), heap: 0, distance2: square(&offset), offset };
-    let mut sp = 0;
-    loop {
-        // Down to a leaf, by the near side of each plane.
-        while cell.code & LEAF == 0 && cell.code != 0 {
-            let treelet = lines.treelet(code_line(cell.code));
+    stack[0] = Entry { along, distance2: 0.0, code: tree.root() };
+    let mut sp = 1;
+    let [x, y, z] = point;
+    let place = Place([x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut children = Children::EMPTY;
+    while sp > 0 {
+        sp -= 1;
+        let cell = stack[sp];
+        if cell.distance2 > near {
+            continue;
+        }
+        if cell.code & LEAF == 0 {
             events.step();
-            while cell.heap < 7 {
-                let axis = (treelet.axes >> (2 * cell.heap)) as usize & 3;
-                let gap = f64::from(treelet.plane[cell.heap as usize]) - p[axis];
-                let upper = u32::from(gap <= 0.0);
-                let mut far = Entry { heap: 2 * cell.heap + 2 - upper, ..cell };
-                far.offset[axis] = gap;
-                far.distance2 = square(&far.offset);
-                stack[sp] = far;
-                sp += usize::from(far.distance2 <= farthest);
-                cell.heap = 2 * cell.heap + 1 + upper;
-            }
-            cell.code = treelet.child[cell.heap as usize - 7];
-            cell.heap = 0;
-        }
-        if cell.code != 0 {
-            events.leaf();
-            let first = code_line(cell.code);
-            let count = tree.block_count(cell.code) as usize;
-            for line in (first..first + count * BLOCK_LINES).step_by(BLOCK_LINES) {
-                events.block();
+            let treelet = lines.treelet(code_line(cell.code));
+            // SAFETY: passed on to the caller.
+            let mut within =
+                unsafe { L::children(&place, treelet, &cell.along, near, &mut children) };
+            let bottom = sp;
+            while within != 0 {
+                let c = within.trailing_zeros() as usize & 7;
+                within &= within - 1;
+                let along = [children.along[0][c], children.along[1][c], children.along[2][c]];
+                let (distance2, code) = (children.distance2[c], treelet.child[c]);
                 // SAFETY: passed on to the caller.
-                let better = unsafe {
-                    look::<L, E>(point, lines.block(line), line, farthest, &mut best, events)
-                };
-                if better {
-                    farthest = limit(best.distance2, diagonal);
+                unsafe { L::prefetch(lines.as_ptr().wrapping_add(code_offset(code))) };
+                // The nearest on top.
+                let mut at = sp;
+                while at > bottom && stack[at - 1].distance2 < distance2 {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
                 }
+                stack[at] = Entry { along, distance2, code };
+                sp += 1;
+            }
+            continue;
+        }
+        events.leaf();
+        let first = code_line(cell.code);
+        let count = tree.block_count(cell.code) as usize;
+        for line in (first..first + count * BLOCK_LINES).step_by(BLOCK_LINES) {
+            events.block();
+            let block = lines.block(line);
+            // SAFETY: passed on to the caller.
+            if unsafe { look::<L, E>(point, block, line, farthest, &mut best, events) } {
+                farthest = limit(best.distance2, diagonal);
+                near = cell_limit(farthest);
             }
         }
-        loop {
-            if sp == 0 {
-                return best;
-            }
-            sp -= 1;
-            if stack[sp].distance2 <= farthest {
-                break;
-            }
-        }
-        cell = stack[sp];
     }
+    best
 }
 
 /// Looks at the triangles of a block; true if one is nearer than the best so far.
@@ -169,7 +187,7 @@ unsafe fn walk<L: BeamSimd, E: Events>(
 /// # Safety
 /// As for [`nearest`].
 #[inline(always)]
-unsafe fn look<L: BeamSimd, E: Events>(
+unsafe fn look<L: PointSimd, E: Events>(
     point: [f64; 3],
     block: &Block,
     line: usize,
@@ -237,9 +255,4 @@ fn corners(block: &Block, lane: usize) -> [[f64; 3]; 3] {
         }
     }
     corners
-}
-
-#[inline(always)]
-fn square(offset: &[f64; 4]) -> f64 {
-    offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]
 }
