@@ -12,6 +12,7 @@ pub mod cost;
 pub mod geometry;
 pub mod kernel;
 pub mod method;
+pub mod point;
 pub mod primitive;
 pub mod ray;
 pub mod rope;

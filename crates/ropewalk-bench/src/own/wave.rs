@@ -7,6 +7,7 @@ use crate::scene::Mesh;
 use crate::workload::Question;
 use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::kernel::{AllHits, BatchCaster};
+use ropewalk::point::PointQueries;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray};
 use std::cell::RefCell;
@@ -58,6 +59,14 @@ impl Wave {
     /// The caster on one thread.
     pub fn caster(&self) -> BatchCaster<'_> {
         BatchCaster::new(&self.tree, &self.geometry).with_threads(1)
+    }
+
+    /// The queries about points on one thread.
+    ///
+    /// # Errors
+    /// If the tree holds anything but triangles.
+    pub fn points(&self) -> anyhow::Result<PointQueries<'_>> {
+        Ok(PointQueries::new(&self.tree, &self.geometry)?.with_threads(1))
     }
 }
 

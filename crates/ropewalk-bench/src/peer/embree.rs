@@ -4,6 +4,8 @@
 //! by default: one level of instancing, instance arrays on, no minimal width.
 #![allow(unsafe_code)]
 
+mod points;
+
 use crate::answer::{BenchHit, HitLists, NO_PRIMITIVE};
 use crate::harness::{Builder, Built, Clock, Engine, Family};
 use crate::scene::Mesh;
@@ -223,6 +225,7 @@ api! {
     rtcOccluded1: Intersect1,
     rtcIntersect16: Intersect16,
     rtcOccluded16: Intersect16,
+    rtcPointQuery: points::PointQuery,
 }
 
 /// A loaded library with a device.

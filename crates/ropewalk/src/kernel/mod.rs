@@ -5,6 +5,8 @@
 //!
 //! A ray by itself goes through the same steps and tests without lists (single.rs).
 //!
+//! Points are answered by walks of their own (point/), one after the other.
+//!
 //! Rays in turn that start or end in one point, or are parallel, and lie close together are taken out of
 //! the batch first and answered in beams (beam/), at a fraction of the cost; which way the rays went is
 //! reported, and answers do not depend on it.
@@ -22,6 +24,7 @@ mod leaf;
 mod level;
 mod list;
 mod order;
+pub(crate) mod point;
 mod query;
 mod scalar;
 mod single;
@@ -34,6 +37,7 @@ mod x86;
 pub use batch::{AllHits, BatchCaster, BatchHit, Start};
 pub use beam::BatchReport;
 pub use events::BatchEvents;
+pub(crate) use events::NoEvents;
 pub use level::Level;
 pub use query::{HitFilter, Masks, NoFilter, Opacity};
 pub use sorted::Sorting;

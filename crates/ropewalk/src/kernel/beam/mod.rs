@@ -27,7 +27,7 @@ mod vector;
 mod x86;
 
 pub use shaft::BeamSimd;
-pub use vector::Doubles;
+pub use vector::{Doubles, Vector};
 #[cfg(target_arch = "x86_64")]
 pub use x86::{EightDoubles, FourDoubles};
 
@@ -42,7 +42,6 @@ use frame::{Frame, NONE, Packet, RAYS};
 use settle::Corners;
 use shaft::Stack;
 use std::ops::Range;
-use vector::Vector;
 
 /// Packets of a beam.
 const PACKETS: usize = 4;

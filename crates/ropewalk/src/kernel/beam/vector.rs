@@ -268,6 +268,8 @@ pub trait Doubles: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output =
     unsafe fn widen(row: &[f32]) -> Self;
     /// Rounds the lanes to the beginning of a row; panics if it is too short.
     fn narrow(self, row: &mut [f32]);
+    /// Writes the lanes to the beginning of a row; panics if it is too short.
+    fn store(self, row: &mut [f64]);
     /// Quotient.
     fn div(self, by: Self) -> Self;
     /// Smaller number.
@@ -295,6 +297,10 @@ impl Doubles for f64 {
     #[inline(always)]
     fn narrow(self, row: &mut [f32]) {
         row[0] = self as f32;
+    }
+    #[inline(always)]
+    fn store(self, row: &mut [f64]) {
+        row[0] = self;
     }
     #[inline(always)]
     fn div(self, by: Self) -> Self {

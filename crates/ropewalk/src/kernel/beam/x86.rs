@@ -61,7 +61,7 @@ operator!(EightDoubles, Mul, mul, _mm512_mul_pd);
 /// The methods of a vector of doubles.
 macro_rules! doubles {
     ($type:ident, $lanes:literal, $splat:ident,
-     $widen:ident of $load:ident, $store:ident of $narrow:ident,
+     $widen:ident of $load:ident, $store:ident of $narrow:ident, $write:ident,
      $(fn $name:ident($self:ident $(, $arg:ident: $ty:ty)*) -> $out:ty $body:block)*) => {
         impl Doubles for $type {
             const LANES: usize = $lanes;
@@ -82,6 +82,12 @@ macro_rules! doubles {
                 // SAFETY: values exist only where the features are; the row is long enough.
                 unsafe { $store(row.as_mut_ptr(), $narrow(self.0)) }
             }
+            #[inline(always)]
+            fn store(self, row: &mut [f64]) {
+                let row = &mut row[..$lanes];
+                // SAFETY: as above.
+                unsafe { $write(row.as_mut_ptr(), self.0) }
+            }
             $(
                 #[inline(always)]
                 fn $name($self $(, $arg: $ty)*) -> $out {
@@ -94,7 +100,7 @@ macro_rules! doubles {
 }
 
 doubles! { FourDoubles, 4, _mm256_set1_pd,
-    _mm256_cvtps_pd of _mm_loadu_ps, _mm_storeu_ps of _mm256_cvtpd_ps,
+    _mm256_cvtps_pd of _mm_loadu_ps, _mm_storeu_ps of _mm256_cvtpd_ps, _mm256_storeu_pd,
     fn div(self, by: Self) -> Self { FourDoubles(_mm256_div_pd(self.0, by.0)) }
     fn min(self, other: Self) -> Self { FourDoubles(_mm256_min_pd(self.0, other.0)) }
     fn max(self, other: Self) -> Self { FourDoubles(_mm256_max_pd(self.0, other.0)) }
@@ -108,7 +114,7 @@ doubles! { FourDoubles, 4, _mm256_set1_pd,
 }
 
 doubles! { EightDoubles, 8, _mm512_set1_pd,
-    _mm512_cvtps_pd of _mm256_loadu_ps, _mm256_storeu_ps of _mm512_cvtpd_ps,
+    _mm512_cvtps_pd of _mm256_loadu_ps, _mm256_storeu_ps of _mm512_cvtpd_ps, _mm512_storeu_pd,
     fn div(self, by: Self) -> Self { EightDoubles(_mm512_div_pd(self.0, by.0)) }
     fn min(self, other: Self) -> Self { EightDoubles(_mm512_min_pd(self.0, other.0)) }
     fn max(self, other: Self) -> Self { EightDoubles(_mm512_max_pd(self.0, other.0)) }

@@ -1,0 +1,39 @@
+//! Points: the nearest triangle, inside or outside, winding numbers, cells.
+//!
+//! [`PointQueries`] answers batches of points over the wide tree of the ray queries;
+//! [`PointBruteForce`] is the definition of every answer. Points are `f64`, triangles `f32` as
+//! everywhere. docs/numerics.md has the rules and why a walk finds what brute force finds.
+
+mod brute_force;
+mod cells;
+mod expansion;
+mod order;
+mod queries;
+mod side;
+mod winding;
+
+pub use brute_force::PointBruteForce;
+pub use cells::Cell;
+pub use queries::{ClosestPoints, PointError, PointQueries};
+pub use side::Side;
+pub(crate) use side::{Crossing, crossing, flushed};
+
+/// Largest coordinate of a point; beyond it products overflow.
+pub const LARGEST: f64 = 1e100;
+
+/// True if a point has an answer: all coordinates are numbers up to [`LARGEST`].
+#[inline(always)]
+pub fn is_near(point: &[f64; 3]) -> bool {
+    point[0].abs() <= LARGEST && point[1].abs() <= LARGEST && point[2].abs() <= LARGEST
+}
+
+/// The point of a primitive that is nearest to a point, in its order among others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClosestPoint {
+    /// Distance, not squared.
+    pub distance: f64,
+    /// The primitive; of those equally near the lowest.
+    pub prim_id: u32,
+    /// The point of it.
+    pub point: [f64; 3],
+}

@@ -1,0 +1,241 @@
+//! Batches of points over a wide tree.
+
+use super::brute_force::{PointBruteForce, closest};
+use super::cells::{self, Cell};
+use super::order::along_curve;
+use super::{ClosestPoint, Side};
+use crate::aabb::Aabb;
+use crate::geometry::Geometry;
+use crate::kernel::point::{self, Found};
+use crate::kernel::{BatchEvents, Level, NoEvents};
+use crate::wide::WideTree;
+use rayon::prelude::*;
+
+/// Points that one task of a parallel batch answers.
+const TASK: usize = 1024;
+
+/// Fewer points than these are answered as they come.
+const SORTED_FROM: usize = 32;
+
+/// Points that are put in order together.
+const SORTED: usize = 1 << 20;
+
+/// Points for which all triangles are gone through that one task answers.
+const FULL_TASK: usize = 4;
+
+/// The nearest triangles of a batch: one entry a point.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ClosestPoints {
+    /// Distance; infinite without a triangle, NaN for a point that is none.
+    pub distance: Vec<f64>,
+    /// The nearest primitive, of those equally near the lowest; `u32::MAX` without one.
+    pub prim_id: Vec<u32>,
+    /// The nearest point of it; NaN without one.
+    pub point: Vec<[f64; 3]>,
+}
+
+/// Why points cannot be answered.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PointError {
+    /// The geometry holds spheres, cones or polygons.
+    #[error("points are answered over triangles only; the geometry holds other primitives too")]
+    NotTriangles,
+}
+
+/// Answers batches of points over a wide tree of triangles.
+///
+/// Points with a NaN or infinite coordinate or one beyond [`LARGEST`](super::LARGEST) have no answer:
+/// NaN, no primitive, outside. Triangles without area are never the nearest and never crossed, and on
+/// which side a triangle can be hit does not matter. Answers are those of [`PointBruteForce`] bit for
+/// bit at every [`Level`], in any order, and with any number of threads. Batches are answered along a curve
+/// through the tree's box, so points need no order of their own.
+#[derive(Clone, Copy)]
+pub struct PointQueries<'a> {
+    tree: &'a WideTree,
+    geometry: &'a Geometry,
+    level: Level,
+    threads: usize,
+}
+
+impl<'a> PointQueries<'a> {
+    /// Queries at the best level of this machine, on all threads of the current rayon pool.
+    ///
+    /// # Errors
+    /// [`PointError::NotTriangles`] if a leaf of the tree holds anything else.
+    pub fn new(tree: &'a WideTree, geometry: &'a Geometry) -> Result<Self, PointError> {
+        if tree.has_shapes() {
+            return Err(PointError::NotTriangles);
+        }
+        Ok(PointQueries { tree, geometry, level: Level::best(), threads: 0 })
+    }
+
+    /// The same with another level, or `None` if this machine lacks it.
+    pub fn with_level(self, level: Level) -> Option<Self> {
+        level.is_available().then_some(PointQueries { level, ..self })
+    }
+
+    /// The same on the calling thread only (`1`) or on the current rayon pool (`0`).
+    pub fn with_threads(self, threads: usize) -> Self {
+        PointQueries { threads, ..self }
+    }
+
+    /// The level in use.
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    /// The nearest triangle of each point and the nearest point of it.
+    pub fn closest_point(&self, points: &[[f64; 3]]) -> ClosestPoints {
+        let nothing = ClosestPoint { distance: f64::NAN, prim_id: u32::MAX, point: [f64::NAN; 3] };
+        let all = self.in_order(points, nothing, |points, answers| {
+            let found = self.found(points);
+            for ((point, found), answer) in points.iter().zip(found).zip(answers) {
+                *answer = ClosestPoint { distance: found.distance2.sqrt(), ..nothing };
+                if found.prim_id != u32::MAX {
+                    *answer = closest(self.geometry, *point, found.distance2, found.prim_id);
+                }
+            }
+        });
+        ClosestPoints {
+            distance: all.iter().map(|nearest| nearest.distance).collect(),
+            prim_id: all.iter().map(|nearest| nearest.prim_id).collect(),
+            point: all.iter().map(|nearest| nearest.point).collect(),
+        }
+    }
+
+    /// The distance of each point from the nearest triangle.
+    pub fn distance(&self, points: &[[f64; 3]]) -> Vec<f64> {
+        self.in_order(points, f64::NAN, |points, distances| {
+            for (found, distance) in self.found(points).iter().zip(distances) {
+                *distance = found.distance2.sqrt();
+            }
+        })
+    }
+
+    /// On which side of a closed surface each point is: the ray along +z crosses it an odd number of
+    /// times from inside. Exact, also through edges and vertices; cavities and nested shells count as
+    /// they lie, coincident triangles cancel, and which way triangles face does not matter. Of an open
+    /// surface the answer holds for that direction only; see [`PointQueries::winding_number`].
+    pub fn sides(&self, points: &[[f64; 3]]) -> Vec<Side> {
+        self.in_order(points, Side::Outside, |points, sides| {
+            point::sides(self.level, self.tree, points, sides, &mut NoEvents);
+        })
+    }
+
+    /// True for points inside of a closed surface or on it; see [`PointQueries::sides`].
+    pub fn contains(&self, points: &[[f64; 3]]) -> Vec<bool> {
+        self.sides(points).into_iter().map(|side| side != Side::Outside).collect()
+    }
+
+    /// The distance of each point from a closed surface, negative inside, 0 on it.
+    pub fn signed_distance(&self, points: &[[f64; 3]]) -> Vec<f64> {
+        let (mut distance, sides) = (self.distance(points), self.sides(points));
+        for (distance, side) in distance.iter_mut().zip(sides) {
+            match side {
+                Side::Outside => {}
+                Side::On => *distance = 0.0,
+                Side::Inside => *distance = -*distance,
+            }
+        }
+        distance
+    }
+
+    /// The generalised winding number of each point (Jacobson, Kavan, Sorkine-Hornung 2013): 1 inside of
+    /// a closed surface whose front is outside, 0 outside, in between near the holes of an open one;
+    /// above .5 means inside. The sum over all triangles: its time grows with their number.
+    pub fn winding_number(&self, points: &[[f64; 3]]) -> Vec<f64> {
+        let oracle = PointBruteForce { geometry: self.geometry };
+        let mut numbers = vec![0.0; points.len()];
+        self.each(points, &mut numbers, FULL_TASK, |points, numbers| {
+            for (point, number) in points.iter().zip(numbers) {
+                *number = oracle.winding_number(*point);
+            }
+        });
+        numbers
+    }
+
+    /// The leaf whose cell holds each point; a point in a plane belongs to the upper side. `None`
+    /// outside of the tree's box, and for NaN.
+    pub fn locate(&self, points: &[[f64; 3]]) -> Vec<Option<Cell>> {
+        let mut found = vec![None; points.len()];
+        self.each(points, &mut found, TASK, |points, found| {
+            for (point, cell) in points.iter().zip(found) {
+                *cell = cells::locate(self.tree, *point);
+            }
+        });
+        found
+    }
+
+    /// The box of a leaf; `None` if the tree has no such leaf.
+    pub fn cell_box(&self, cell: Cell) -> Option<Aabb> {
+        cells::cell_box(self.tree, cell)
+    }
+
+    /// What [`PointQueries::closest_point`] does, counted, on one thread: steps are treelets, `met` blocks
+    /// tested beyond the boxes of their triangles, `clear` triangles in them near enough.
+    pub fn closest_point_events(&self, points: &[[f64; 3]]) -> BatchEvents {
+        let (mut found, mut events) = (vec![Found::INVALID; points.len()], BatchEvents::default());
+        point::nearest(self.level, self.tree, points, &mut found, &mut events);
+        events
+    }
+
+    /// What [`PointQueries::sides`] does, counted in the same way.
+    pub fn sides_events(&self, points: &[[f64; 3]]) -> BatchEvents {
+        let (mut sides, mut events) = (vec![Side::Outside; points.len()], BatchEvents::default());
+        point::sides(self.level, self.tree, points, &mut sides, &mut events);
+        events
+    }
+
+    /// The nearest triangles, one point after the other.
+    fn found(&self, points: &[[f64; 3]]) -> Vec<Found> {
+        let mut found = vec![Found::INVALID; points.len()];
+        point::nearest(self.level, self.tree, points, &mut found, &mut NoEvents);
+        found
+    }
+
+    /// Puts points to `work` along a curve, and its answers where they belong.
+    fn in_order<T: Copy + Send>(
+        &self,
+        points: &[[f64; 3]],
+        nothing: T,
+        work: impl Fn(&[[f64; 3]], &mut [T]) + Sync,
+    ) -> Vec<T> {
+        let mut answers = vec![nothing; points.len()];
+        if points.len() < SORTED_FROM {
+            work(points, &mut answers);
+            return answers;
+        }
+        let mut found = vec![nothing; points.len().min(SORTED)];
+        for (points, answers) in points.chunks(SORTED).zip(answers.chunks_mut(SORTED)) {
+            let parallel = !self.is_serial(points, TASK);
+            let order = along_curve(points, self.tree.bounds(), parallel);
+            let sorted: Vec<[f64; 3]> = order.iter().map(|&i| points[i as usize]).collect();
+            let found = &mut found[..points.len()];
+            self.each(&sorted, found, TASK, &work);
+            for (&i, found) in order.iter().zip(found) {
+                answers[i as usize] = *found;
+            }
+        }
+        answers
+    }
+
+    fn is_serial(&self, points: &[[f64; 3]], task: usize) -> bool {
+        self.threads == 1 || points.len() <= task
+    }
+
+    /// Shares points and answers out over the threads.
+    fn each<T: Send>(
+        &self,
+        points: &[[f64; 3]],
+        answers: &mut [T],
+        task: usize,
+        work: impl Fn(&[[f64; 3]], &mut [T]) + Sync,
+    ) {
+        if self.is_serial(points, task) {
+            return work(points, answers);
+        }
+        let chunks = points.par_chunks(task).zip(answers.par_chunks_mut(task));
+        chunks.for_each(|(points, answers)| work(points, answers));
+    }
+}
