@@ -26,7 +26,7 @@ pub enum Sorting {
     Never,
 }
 
-/// Most rays that are sorted together: 40 bytes each are kept by each thread for it.
+/// Most rays that are sorted together: some 50 bytes each are kept by each thread for it.
 pub const GROUP: usize = 1 << 20;
 
 /// Fewest rays that are worth it.

@@ -70,7 +70,7 @@ unsafe fn walk<L: BeamSimd, E: Events>(
     crossed: &mut Vec<u32>,
     events: &mut E,
 ) -> Side {
-    events.ray();
+    events.rays(1);
     let (lines, p) = (tree.lines(), column.point);
     let mut stack = [(0, 0); STACK];
     let (mut code, mut heap, mut sp) = (tree.root(), 0, 0);

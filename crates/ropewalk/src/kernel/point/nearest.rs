@@ -113,7 +113,7 @@ unsafe fn walk<L: PointSimd, E: Events>(
     if tree.root() == 0 {
         return best;
     }
-    events.ray();
+    events.rays(1);
     let lines = tree.lines();
     let mut farthest = f64::MAX;
     if seed.at != NONE {
