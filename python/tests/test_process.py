@@ -169,6 +169,8 @@ def test_many_threads_share_a_scene():
 
 INTERRUPTED = """
     import os, signal, threading, time, numpy as np, ropewalk
+    # A shell that starts tests in the background has them ignore it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     v = np.random.default_rng(0).normal(size=({triangles} * 3, 3))
     f = np.arange(len(v)).reshape(-1, 3)
     {prepare}
