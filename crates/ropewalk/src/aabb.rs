@@ -53,6 +53,18 @@ impl Aabb {
         out
     }
 
+    /// The box with each side moved outwards by `margin`; an empty box stays empty.
+    pub fn grown(mut self, margin: f32) -> Self {
+        if self.is_empty() {
+            return self;
+        }
+        for a in 0..3 {
+            self.min[a] -= margin;
+            self.max[a] += margin;
+        }
+        self
+    }
+
     /// True if `point` lies in the closed box.
     pub fn contains_point(&self, point: [f32; 3]) -> bool {
         (0..3).all(|a| self.min[a] <= point[a] && point[a] <= self.max[a])

@@ -82,16 +82,21 @@ impl Shear {
     /// The frame of a valid ray.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
-        let [x, y, z] = ray.dir;
-        let kz = usize::from(y.abs() > x.abs());
-        let kz = if z.abs() > ray.dir[kz].abs() { 2 } else { kz };
+        Self::along(&ray.origin, &ray.dir)
+    }
+
+    /// The frame of a line with a direction other than zero, `f32` or `f64`.
+    #[inline(always)]
+    pub fn along<T: Copy + Into<f64>>(origin: &[T; 3], dir: &[T; 3]) -> Self {
+        let d = |a: usize| -> f64 { dir[a].into() };
+        let kz = usize::from(d(1).abs() > d(0).abs());
+        let kz = if d(2).abs() > d(kz).abs() { 2 } else { kz };
         // Swapped where the ray looks down, which keeps the winding.
-        let down = usize::from(ray.dir[kz] < 0.0);
+        let down = usize::from(d(kz) < 0.0);
         let kx = (kz + 1 + down) % 3;
         let ky = (kz + 2 - down) % 3;
-        let dz = f64::from(ray.dir[kz]);
-        let (dx, dy) = (f64::from(ray.dir[kx]), f64::from(ray.dir[ky]));
-        let origin = |a: usize| f64::from(ray.origin[a]);
+        let (dx, dy, dz) = (d(kx), d(ky), d(kz));
+        let origin = |a: usize| -> f64 { origin[a].into() };
         Shear {
             k: [kx, ky, kz],
             origin: [origin(kx), origin(ky), origin(kz)],

@@ -36,14 +36,24 @@ pub(crate) struct Clipper<'a> {
     pub geometry: &'a Geometry,
     /// False: the boxes are cut, not the primitives.
     pub clipping: bool,
+    /// See [`BuildSettings::margin`](crate::build::BuildSettings::margin).
+    pub margin: f32,
 }
 
 impl Clipper<'_> {
     /// The part of a fragment inside a child cell, `None` if the primitive does not reach it.
     fn clip(&self, fragment: &Fragment, cell: &Aabb) -> Option<Fragment> {
         let bounds = if self.clipping {
+            let shape = self.geometry.shape(fragment.prim());
             // The intersection holds a foreign primitive to its contract.
-            self.geometry.shape(fragment.prim()).clipped_bounds(cell)?.intersection(cell)
+            match self.margin {
+                0.0 => shape.clipped_bounds(cell)?.intersection(cell),
+                margin => {
+                    let near = cell.grown(margin);
+                    let part = shape.clipped_bounds(&near)?.intersection(&near);
+                    part.grown(margin).intersection(cell)
+                }
+            }
         } else {
             fragment.bounds().intersection(cell)
         };

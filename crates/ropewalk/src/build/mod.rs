@@ -24,6 +24,7 @@ pub use monitor::Monitor;
 pub use report::{BuildReport, StopCounts};
 pub use settings::{BuildSettings, Measure, Preset, Termination, TerminationEstimator};
 
+use crate::aabb::Aabb;
 use crate::cost;
 use crate::geometry::Geometry;
 use crate::primitive::Primitive;
@@ -74,7 +75,8 @@ pub(crate) fn build_here(
     let start = Instant::now();
     let blockage = blockage(geometry, settings, monitor)?;
     let output = build_output(geometry, settings, blockage.as_ref(), monitor)?;
-    let tree = BspTree::from_parts(geometry.bounds(), output.nodes, output.refs);
+    let root = root_cell(geometry, settings);
+    let tree = BspTree::from_parts(root, output.nodes, output.refs);
     let seconds = start.elapsed().as_secs_f64();
     let stats = TreeStats::of(&tree);
     let report = BuildReport {
@@ -149,6 +151,11 @@ pub(crate) fn in_pool<T: Send>(
     Ok(pool.install(work))
 }
 
+/// The cell of the root.
+fn root_cell(geometry: &Geometry, settings: &BuildSettings) -> Aabb {
+    geometry.bounds().grown(settings.margin)
+}
+
 fn build_output(
     geometry: &Geometry,
     settings: &BuildSettings,
@@ -164,7 +171,8 @@ fn build_output(
         max_size_price: settings.max_size_price,
     };
     let search = plane_search(settings, pricing, blockage);
-    let fragment = |prim| Fragment::new(prim, &geometry.shape(prim).bounds());
+    let thick = |prim| geometry.shape(prim).bounds().grown(settings.margin);
+    let fragment = |prim| Fragment::new(prim, &thick(prim));
     let prims = 0..geometry.len() as u32;
     let fragments: Vec<Fragment> = if settings.threads == 1 {
         prims.map(fragment).collect()
@@ -174,7 +182,7 @@ fn build_output(
     let references = (settings.max_duplication * fragments.len() as f64) as u64;
     let context = Context {
         search: search.as_ref(),
-        clipper: Clipper { geometry, clipping: settings.clipping },
+        clipper: Clipper { geometry, clipping: settings.clipping, margin: settings.margin },
         pricing,
         stopping: Stopping::new(settings.termination, fragments.len()),
         late_cutting: settings.late_cutting,
@@ -182,7 +190,11 @@ fn build_output(
         monitor,
         done: AtomicU64::new(0),
     };
-    context.build(fragments, geometry.bounds(), references.min(u64::from(Node::MAX_INDEX)))
+    context.build(
+        fragments,
+        root_cell(geometry, settings),
+        references.min(u64::from(Node::MAX_INDEX)),
+    )
 }
 
 fn plane_search<'a>(

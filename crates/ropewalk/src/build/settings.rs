@@ -168,6 +168,9 @@ pub struct BuildSettings {
     /// Kapustin 2007) instead of sweeping over all of them; `usize::MAX` is the exact sweep
     /// everywhere. Read by [`Measure::MacDonaldBooth`] alone.
     pub binned_from: usize,
+    /// Width by which all primitives are thickened on every side, so that cells also refer to those that
+    /// pass by them so closely: for geometry that has been rounded. 0 is off.
+    pub margin: f32,
     /// Threads; 0 is one per core. The tree is the same for any number.
     pub threads: usize,
 }
@@ -187,6 +190,7 @@ impl Default for BuildSettings {
             clipping: true,
             max_duplication: 32.0,
             binned_from: usize::MAX,
+            margin: 0.0,
             threads: 0,
         }
     }
@@ -236,6 +240,8 @@ impl BuildSettings {
         number(p >= 0.0, "max_size_price", p, "a finite number, at least 0")?;
         let d = self.max_duplication;
         number(d >= 1.0, "max_duplication", d, "a finite number, at least 1")?;
+        let m = f64::from(self.margin);
+        number(m >= 0.0, "margin", m, "a finite number, at least 0")?;
         match self.leaf_cost {
             LeafCost::Linear => {}
             LeafCost::Blocks { width } => {

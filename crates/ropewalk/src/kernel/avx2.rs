@@ -72,20 +72,20 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn meets(slot: &Slot, block: &Block) -> u32 {
+    unsafe fn meets<const ROUNDED: bool>(slot: &Slot, block: &Block) -> u32 {
         // SAFETY: the caller vouches for the features.
         unsafe {
-            let lanes = x86::lanes(slot, block);
+            let lanes = x86::lanes::<ROUNDED>(slot, block);
             let (limit, t_min) = (_mm256_set1_ps(slot.limit), _mm256_set1_ps(slot.t_min));
             _mm256_movemask_ps(meets(&lanes, limit, t_min)) as u32
         }
     }
 
     #[inline(always)]
-    unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
+    unsafe fn test<const ROUNDED: bool>(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         // SAFETY: the caller vouches for the features; the stores fill the rows of `range`.
         unsafe {
-            let lanes = x86::lanes(slot, block);
+            let lanes = x86::lanes::<ROUNDED>(slot, block);
             let limit = _mm256_set1_ps(slot.limit);
             let t_min = _mm256_set1_ps(slot.t_min);
             let meets = meets(&lanes, limit, t_min);

@@ -68,20 +68,20 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn meets(slot: &Slot, block: &Block) -> u32 {
+    unsafe fn meets<const ROUNDED: bool>(slot: &Slot, block: &Block) -> u32 {
         // SAFETY: the caller vouches for the features.
         unsafe {
-            let lanes = x86::lanes(slot, block);
+            let lanes = x86::lanes::<ROUNDED>(slot, block);
             let (limit, t_min) = (_mm256_set1_ps(slot.limit), _mm256_set1_ps(slot.t_min));
             u32::from(meets(&lanes, limit, t_min))
         }
     }
 
     #[inline(always)]
-    unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
+    unsafe fn test<const ROUNDED: bool>(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         // SAFETY: the caller vouches for the features; the stores fill the rows of `range`.
         unsafe {
-            let lanes = x86::lanes(slot, block);
+            let lanes = x86::lanes::<ROUNDED>(slot, block);
             let limit = _mm256_set1_ps(slot.limit);
             let t_min = _mm256_set1_ps(slot.t_min);
             let meets = meets(&lanes, limit, t_min);

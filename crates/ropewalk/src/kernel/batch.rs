@@ -21,7 +21,7 @@ use crate::wide::WideTree;
 use rayon::prelude::*;
 
 /// Rays that one task of a parallel batch traces.
-const TASK: usize = 4096;
+pub(super) const TASK: usize = 4096;
 
 /// One ray in so many is tried before a batch is started, [`MAX_SAMPLE`] at most.
 const RAYS_PER_SAMPLE: usize = 256;
@@ -136,6 +136,11 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// The same with incoherent rays sorted by where they start, or not. The answers are the same.
     pub fn with_sorting(self, sorting: Sorting) -> Self {
         BatchCaster { sorting, ..self }
+    }
+
+    /// See [`BatchCaster::with_threads`].
+    pub(super) fn threads(&self) -> usize {
+        self.threads
     }
 
     /// The level in use.
@@ -472,7 +477,7 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     }
 
     /// All rays in the wave, from the root or from their entries.
-    fn run_wave<Q: BatchQuery, E: Events>(
+    pub(super) fn run_wave<Q: BatchQuery, E: Events>(
         &self,
         rays: &[Ray],
         search: bool,

@@ -38,7 +38,12 @@ impl Exact<'_> {
         let met = Triangle::meet(corner, &Shear::new(ray), block.sides(lane))?;
         let t = met.t as f32;
         let accepted = t.is_finite() && ray.t_min <= t && t <= ray.t_max;
-        accepted.then_some(Hit { t, prim_id: block.id[lane] & ID_MASK, u: met.u, v: met.v })
+        accepted.then_some(Hit {
+            t,
+            prim_id: block.id[lane] & ID_MASK,
+            u: met.u as f32,
+            v: met.v as f32,
+        })
     }
 }
 

@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::events::Events;
-use super::exact::{Exact, place};
+use super::exact::Exact;
 use super::level::{Found, Range, Simd};
 use super::query::{BatchQuery, Clear};
 use super::slot::Slot;
@@ -36,11 +36,19 @@ impl Leaves<'_> {
     /// The machine must have the features of `L`, and the caller must enable them; a block of the tree
     /// must begin at `line`.
     #[inline(always)]
-    pub unsafe fn meet<L: Simd, const SHAPES: bool>(&self, slot: &Slot, line: usize) -> u32 {
+    pub unsafe fn meet<L: Simd, Q: BatchQuery, const SHAPES: bool>(
+        &self,
+        slot: &Slot,
+        line: usize,
+    ) -> u32 {
         // SAFETY: passed on to the caller.
         unsafe {
             let block = self.block(line);
-            let lanes = L::meets(slot, block);
+            let lanes = if Q::ROUNDED {
+                L::meets::<true>(slot, block)
+            } else {
+                L::meets::<false>(slot, block)
+            };
             if SHAPES { lanes | block.shape_lanes() << WIDTH } else { lanes }
         }
     }
@@ -66,7 +74,11 @@ impl Leaves<'_> {
         unsafe {
             let block = self.block(line);
             let mut range = Range::default();
-            let Found { clear, open } = L::test(slot, block, &mut range);
+            let Found { clear, open } = if Q::ROUNDED {
+                L::test::<true>(slot, block, &mut range)
+            } else {
+                L::test::<false>(slot, block, &mut range)
+            };
             events.found(clear, open);
             let hits = Clear { lanes: clear, range: &range, block, line };
             let unclear = query.take_clear::<L>(k as usize, slot, &hits, &self.exact);
@@ -89,9 +101,7 @@ impl Leaves<'_> {
         }
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
-            if let Some(hit) = self.exact.hit(slot.ray, place(line, lane)) {
-                query.take(k as usize, slot, &hit, &self.exact);
-            }
+            query.decide(k as usize, slot, (line, lane), &self.exact);
             lanes &= lanes - 1;
         }
     }

@@ -148,6 +148,16 @@ pub const DEPTH_SLACK: f32 = 16.0 * f32::EPSILON / 2.0;
 /// `3 / 2 + 3 / 2` ranges times `slack`, and `det`, computed, divides it. 4 leaves room for roundings.
 pub const WEIGHT_SLACK: f32 = 4.0;
 
+/// Added to the largest parameter of a triangle where ray and triangle are [rounded](crate::double):
+/// with sheared coordinates off by `9 u` each, `u = 2^-24`, an edge function is off by another
+/// `18 u S + 162 u^2`, and a parameter by `5 u`; what is added to the bounds is `20 u (S + 16 u)` at
+/// least, since the largest direction component is 1 at least, and `20 u`. More would cost exact tests
+/// of the triangles that rays start from.
+pub const ROUNDED_DEPTH: f32 = 1.25;
+
+/// Added to the size of a triangle for the same reason.
+pub const ROUNDED_SIZE: f32 = 16.0 * f32::EPSILON / 2.0;
+
 /// The two hot steps, written for each level.
 ///
 /// # Safety
@@ -182,16 +192,19 @@ pub trait Simd: Locate {
     ///
     /// # Safety
     /// See the trait.
-    unsafe fn meets(slot: &Slot, block: &Block) -> u32;
+    unsafe fn meets<const ROUNDED: bool>(slot: &Slot, block: &Block) -> u32;
 
     /// Tests the triangles of a block against the slot's ray, `t_min` and `limit`.
     ///
     /// `f32` with error bounds: a lane that is neither clear nor open is not hit, or hit beyond the
     /// limit. Rounding: see [`Slot::edge_slack`]. Lanes without a triangle (NaN) are never set.
     ///
+    /// `ROUNDED` says that ray and triangles have been rounded from `f64` as
+    /// [`double`](crate::double) does; the bounds then hold for what they were before.
+    ///
     /// # Safety
     /// See the trait.
-    unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found;
+    unsafe fn test<const ROUNDED: bool>(slot: &Slot, block: &Block, range: &mut Range) -> Found;
 
     /// The clear lane with the smallest upper bound, that bound, and the other clear lanes whose
     /// lower bound does not lie above it. Lane 0 and infinity without clear lanes.

@@ -15,6 +15,7 @@ mod avx2;
 mod avx512;
 mod batch;
 mod beam;
+mod double;
 mod entry;
 mod entry_x86;
 mod events;
@@ -36,6 +37,7 @@ mod x86;
 
 pub use batch::{AllHits, BatchCaster, BatchHit, Start};
 pub use beam::BatchReport;
+pub use double::{DoubleAllHits, DoubleBatchHit, DoubleCaster, DoubleFilter};
 pub use events::BatchEvents;
 pub(crate) use events::NoEvents;
 pub use level::Level;

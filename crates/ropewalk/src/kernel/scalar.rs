@@ -3,7 +3,9 @@
 #![allow(unsafe_code)]
 
 use super::entry::{Corners, Locate, REACH, Segment, path};
-use super::level::{DEPTH_SLACK, Found, Nearest, Range, Root, Simd, WEIGHT_SLACK};
+use super::level::{
+    DEPTH_SLACK, Found, Nearest, ROUNDED_DEPTH, ROUNDED_SIZE, Range, Root, Simd, WEIGHT_SLACK,
+};
 use super::slot::{Loaded, Slot, TINY, later};
 use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
@@ -54,14 +56,14 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    unsafe fn meets(slot: &Slot, block: &Block) -> u32 {
+    unsafe fn meets<const ROUNDED: bool>(slot: &Slot, block: &Block) -> u32 {
         // SAFETY: portable code.
-        let found = unsafe { Self::test(slot, block, &mut Range::default()) };
+        let found = unsafe { Self::test::<ROUNDED>(slot, block, &mut Range::default()) };
         found.clear | found.open
     }
 
     #[inline(always)]
-    unsafe fn test(slot: &Slot, block: &Block, range: &mut Range) -> Found {
+    unsafe fn test<const ROUNDED: bool>(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         let k = slot.k.map(|a| a as usize);
         let [sx, sy, sz] = slot.shear;
         let mut found = Found::default();
@@ -77,7 +79,10 @@ impl Simd for Scalar {
             let (smallest, largest) = (u.min(v).min(w), u.max(v).max(w));
             let size = |i: usize| a[i].abs().max(b[i].abs()).max(c[i].abs());
             let (near, far) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
-            let (reach, sum) = (near.abs().max(far.abs()), size(0) + size(1));
+            let (mut reach, mut sum) = (near.abs().max(far.abs()), size(0) + size(1));
+            if ROUNDED {
+                (reach, sum) = (reach + ROUNDED_DEPTH, sum + ROUNDED_SIZE);
+            }
             let slack = slot.edge_slack * sum * (reach + slot.half_scale * sum) + TINY;
             let outside = smallest < -slack && largest > slack;
             let blur = DEPTH_SLACK * reach;

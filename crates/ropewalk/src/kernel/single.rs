@@ -75,7 +75,7 @@ pub unsafe fn single<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
             events.block();
             // SAFETY: the codes of a tree lead to its blocks; the rest passed on to the caller.
             unsafe {
-                let lanes = leaves.meet::<L, SHAPES>(slot, line);
+                let lanes = leaves.meet::<L, Q, SHAPES>(slot, line);
                 if lanes != 0 {
                     let (open, _) =
                         leaves.test::<L, Q, E>((0, &mut *slot), line, lanes, query, events);

@@ -265,7 +265,7 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
                         self.struck += u64::from(struck);
                         open
                     } else {
-                        leaves.meet::<L, SHAPES>(slot, line)
+                        leaves.meet::<L, Q, SHAPES>(slot, line)
                     }
                 };
                 met.set(meeting, k, line, lanes);

@@ -9,7 +9,7 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::level::{DEPTH_SLACK, Root, WEIGHT_SLACK};
+use super::level::{DEPTH_SLACK, ROUNDED_DEPTH, ROUNDED_SIZE, Root, WEIGHT_SLACK};
 use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
 use crate::ray::Ray;
 use crate::wide::{AXIS_SHIFTS, Block, Flips, ORDER, Treelet, WIDTH};
@@ -241,7 +241,7 @@ unsafe fn size(p: __m256, q: __m256, r: __m256) -> __m256 {
 /// # Safety
 /// As for [`children`].
 #[inline(always)]
-pub unsafe fn lanes(slot: &Slot, block: &Block) -> Lanes {
+pub unsafe fn lanes<const ROUNDED: bool>(slot: &Slot, block: &Block) -> Lanes {
     // SAFETY: the caller vouches for the features.
     unsafe {
         let a = sheared(slot, &block.vertex[0]);
@@ -253,9 +253,15 @@ pub unsafe fn lanes(slot: &Slot, block: &Block) -> Lanes {
 
         let near = _mm256_min_ps(_mm256_min_ps(a[2], b[2]), c[2]);
         let far = _mm256_max_ps(_mm256_max_ps(a[2], b[2]), c[2]);
-        let reach = _mm256_max_ps(_mm256_andnot_ps(SIGN, near), _mm256_andnot_ps(SIGN, far));
+        let mut reach = _mm256_max_ps(_mm256_andnot_ps(SIGN, near), _mm256_andnot_ps(SIGN, far));
+        if ROUNDED {
+            reach = _mm256_add_ps(reach, _mm256_set1_ps(ROUNDED_DEPTH));
+        }
         let blur = _mm256_mul_ps(reach, _mm256_set1_ps(DEPTH_SLACK));
-        let sum = _mm256_add_ps(size(a[0], b[0], c[0]), size(a[1], b[1], c[1]));
+        let mut sum = _mm256_add_ps(size(a[0], b[0], c[0]), size(a[1], b[1], c[1]));
+        if ROUNDED {
+            sum = _mm256_add_ps(sum, _mm256_set1_ps(ROUNDED_SIZE));
+        }
         let scale = _mm256_fmadd_ps(sum, _mm256_set1_ps(slot.half_scale), reach);
         let slack = _mm256_mul_ps(sum, _mm256_set1_ps(slot.edge_slack));
         let slack = _mm256_fmadd_ps(slack, scale, _mm256_set1_ps(TINY));

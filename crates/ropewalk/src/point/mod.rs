@@ -6,7 +6,7 @@
 
 mod brute_force;
 mod cells;
-mod expansion;
+pub(crate) mod expansion;
 mod order;
 mod queries;
 mod side;

@@ -59,18 +59,24 @@ impl Triangle {
     }
 
     /// Where the line of a ray meets the triangle whose vertex `i` has the coordinate `at(i, axis)`,
-    /// on one of `sides`, whatever the ray's range. The triangle must not be degenerate.
+    /// on one of `sides`, whatever the ray's range. The triangle must not be degenerate. With `f64`
+    /// coordinates the differences to the origin are rounded too, the same way for all triangles of a
+    /// vertex.
     ///
     /// Written out without arrays of vertices: the batch kernels call it for triangles that lie
     /// elsewhere.
     #[inline(always)]
-    pub fn meet(at: impl Fn(usize, usize) -> f32, frame: &Shear, sides: Sides) -> Option<Meeting> {
+    pub fn meet<T: Into<f64>>(
+        at: impl Fn(usize, usize) -> T,
+        frame: &Shear,
+        sides: Sides,
+    ) -> Option<Meeting> {
         let [kx, ky, kz] = frame.k;
         let [sx, sy, sz] = frame.shear;
         let corner = |i: usize| {
-            let dz = f64::from(at(i, kz)) - frame.origin[2];
-            let dx = f64::from(at(i, kx)) - frame.origin[0];
-            let dy = f64::from(at(i, ky)) - frame.origin[1];
+            let dz = at(i, kz).into() - frame.origin[2];
+            let dx = at(i, kx).into() - frame.origin[0];
+            let dy = at(i, ky).into() - frame.origin[1];
             [dx - sx * dz, dy - sy * dz, dz]
         };
         let (a, b, c) = (corner(0), corner(1), corner(2));
@@ -98,7 +104,7 @@ impl Triangle {
         let nearest = a[2].min(b[2]).min(c[2]);
         let farthest = a[2].max(b[2]).max(c[2]);
         let t = sz * depth.clamp(nearest, farthest);
-        Some(Meeting { t, u: (v / det) as f32, v: (w / det) as f32 })
+        Some(Meeting { t, u: v / det, v: w / det })
     }
 
     /// The clipped triangle, in a cell widened by `slack`.
@@ -115,9 +121,9 @@ pub struct Meeting {
     /// Parameter along the ray, not yet rounded.
     pub t: f64,
     /// Barycentric weight of vertex 1.
-    pub u: f32,
+    pub u: f64,
     /// Barycentric weight of vertex 2.
-    pub v: f32,
+    pub v: f64,
 }
 
 /// Where the sum of the edge functions is below this share of their products, these are computed
@@ -214,7 +220,7 @@ impl Primitive for Triangle {
         let Meeting { t, u, v } = Self::meet(|i, axis| self.vertices[i][axis], &ray.frame, sides)?;
         let crossing = Crossing::in_range(ray, t)?;
         // Points on one line can enclose a ray only by rounding.
-        (!self.is_degenerate()).then_some(Crossing { u, v, ..crossing })
+        (!self.is_degenerate()).then_some(Crossing { u: u as f32, v: v as f32, ..crossing })
     }
 
     fn normals(&self, _point: [f64; 3], _crossing: Crossing) -> SurfaceNormals {

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::build::{self, BuildError, BuildReport, BuildSettings, Monitor};
 use crate::geometry::Geometry;
-use crate::primitive::{Primitive, Shape, Sides};
+use crate::primitive::{Primitive, Shape, Sides, Triangle};
 use crate::tree::{BspTree, NodeKind};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,11 +25,22 @@ impl WideTree {
         settings: &BuildSettings,
         monitor: &dyn Monitor,
     ) -> Result<(WideTree, BuildReport), BuildError> {
+        Self::build_without(&|_, triangle| triangle.is_degenerate(), geometry, settings, monitor)
+    }
+
+    /// [`WideTree::build`] without the triangles that `is_left_out` names: their lanes are never hit.
+    pub(crate) fn build_without(
+        is_left_out: LeftOut<'_>,
+        geometry: &Geometry,
+        settings: &BuildSettings,
+        monitor: &dyn Monitor,
+    ) -> Result<(WideTree, BuildReport), BuildError> {
         let start = Instant::now();
         let settings = settings.effective()?;
         build::in_pool(settings.threads, || {
             let (tree, mut report) = build::build_here(geometry, &settings, monitor)?;
-            let wide = Self::compile_with(&tree, geometry, settings.threads != 1)?;
+            let parallel = settings.threads != 1;
+            let wide = Self::compile_with(&tree, geometry, parallel, is_left_out)?;
             report.seconds = start.elapsed().as_secs_f64();
             Ok((wide, report))
         })?
@@ -43,13 +54,14 @@ impl WideTree {
     /// # Errors
     /// [`CompileError`] if the tree is too large for its codes or for memory.
     pub fn compile(tree: &BspTree, geometry: &Geometry) -> Result<WideTree, CompileError> {
-        Self::compile_with(tree, geometry, false)
+        Self::compile_with(tree, geometry, false, &|_, triangle| triangle.is_degenerate())
     }
 
     fn compile_with(
         tree: &BspTree,
         geometry: &Geometry,
         parallel: bool,
+        is_left_out: LeftOut<'_>,
     ) -> Result<WideTree, CompileError> {
         let (treelets, blocks) = count(tree);
         // Line 0 is a dummy, so that the code 0 means an empty cell everywhere.
@@ -74,7 +86,7 @@ impl WideTree {
         };
         let Compiler { mut lines, next, runs, overflow, .. } = compiler;
         debug_assert_eq!(next as usize, needed);
-        let has_shapes = fill(&mut lines, &runs, tree, geometry, parallel);
+        let has_shapes = fill(&mut lines, &runs, (tree, geometry, is_left_out), parallel);
         Ok(WideTree { bounds: tree.bounds(), root, lines, treelets, blocks, overflow, has_shapes })
     }
 }
@@ -106,6 +118,9 @@ struct Compiler<'a> {
     overflow: Vec<(u32, u32)>,
 }
 
+/// Says of a triangle and its number whether it is never hit.
+pub(crate) type LeftOut<'a> = &'a (dyn Fn(u32, &Triangle) -> bool + Sync);
+
 /// The references that go into a block.
 #[derive(Clone, Copy)]
 struct Run {
@@ -122,14 +137,14 @@ const MIN_RUNS: usize = 1024;
 fn fill(
     lines: &mut Lines,
     runs: &[Run],
-    tree: &BspTree,
-    geometry: &Geometry,
+    (tree, geometry, is_left_out): (&BspTree, &Geometry, LeftOut<'_>),
     parallel: bool,
 ) -> bool {
     let has_shapes = AtomicBool::new(false);
     let write = |(runs, first, bytes): (&[Run], u32, &mut [u8])| {
         for run in runs {
-            let block = block(geometry, tree.leaf_refs(run.first_ref, run.count), &has_shapes);
+            let prims = tree.leaf_refs(run.first_ref, run.count);
+            let block = block(geometry, is_left_out, prims, &has_shapes);
             let at = (run.line - first) as usize * LINE;
             bytes[at..][..size_of::<Block>()].copy_from_slice(bytemuck::bytes_of(&block));
         }
@@ -152,7 +167,12 @@ fn fill(
 }
 
 /// A block of up to eight primitives; notes whether there are others than triangles.
-fn block(geometry: &Geometry, prims: &[u32], has_shapes: &AtomicBool) -> Block {
+fn block(
+    geometry: &Geometry,
+    is_left_out: LeftOut<'_>,
+    prims: &[u32],
+    has_shapes: &AtomicBool,
+) -> Block {
     let mut block = Block::EMPTY;
     for (lane, &prim) in prims.iter().enumerate().take(WIDTH) {
         let sides = match geometry.sides(prim) {
@@ -162,8 +182,8 @@ fn block(geometry: &Geometry, prims: &[u32], has_shapes: &AtomicBool) -> Block {
         };
         block.id[lane] = prim | sides;
         match geometry.shape(prim) {
-            // A degenerate triangle keeps its id and NaN vertices: it is never hit.
-            Shape::Triangle(triangle) if triangle.is_degenerate() => {}
+            // It keeps its id and NaN vertices: it is never hit.
+            Shape::Triangle(triangle) if is_left_out(prim, triangle) => {}
             Shape::Triangle(triangle) => {
                 for (rows, vertex) in block.vertex.iter_mut().zip(triangle.vertices) {
                     for (row, x) in rows.iter_mut().zip(vertex) {

@@ -266,6 +266,11 @@ pub trait Doubles: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output =
     /// # Safety
     /// As for [`Vector::load`].
     unsafe fn widen(row: &[f32]) -> Self;
+    /// The first numbers of a row.
+    ///
+    /// # Safety
+    /// As for [`Vector::load`].
+    unsafe fn load(row: &[f64]) -> Self;
     /// Rounds the lanes to the beginning of a row; panics if it is too short.
     fn narrow(self, row: &mut [f32]);
     /// Writes the lanes to the beginning of a row; panics if it is too short.
@@ -293,6 +298,10 @@ impl Doubles for f64 {
     #[inline(always)]
     unsafe fn widen(row: &[f32]) -> Self {
         f64::from(row[0])
+    }
+    #[inline(always)]
+    unsafe fn load(row: &[f64]) -> Self {
+        row[0]
     }
     #[inline(always)]
     fn narrow(self, row: &mut [f32]) {

@@ -61,7 +61,7 @@ operator!(EightDoubles, Mul, mul, _mm512_mul_pd);
 /// The methods of a vector of doubles.
 macro_rules! doubles {
     ($type:ident, $lanes:literal, $splat:ident,
-     $widen:ident of $load:ident, $store:ident of $narrow:ident, $write:ident,
+     $widen:ident of $load:ident, $store:ident of $narrow:ident, $write:ident, $read:ident,
      $(fn $name:ident($self:ident $(, $arg:ident: $ty:ty)*) -> $out:ty $body:block)*) => {
         impl Doubles for $type {
             const LANES: usize = $lanes;
@@ -75,6 +75,12 @@ macro_rules! doubles {
                 debug_assert!(row.len() >= $lanes);
                 // SAFETY: the caller vouches for the features and the length.
                 unsafe { $type($widen($load(row.as_ptr()))) }
+            }
+            #[inline(always)]
+            unsafe fn load(row: &[f64]) -> Self {
+                debug_assert!(row.len() >= $lanes);
+                // SAFETY: as above.
+                unsafe { $type($read(row.as_ptr())) }
             }
             #[inline(always)]
             fn narrow(self, row: &mut [f32]) {
@@ -100,7 +106,7 @@ macro_rules! doubles {
 }
 
 doubles! { FourDoubles, 4, _mm256_set1_pd,
-    _mm256_cvtps_pd of _mm_loadu_ps, _mm_storeu_ps of _mm256_cvtpd_ps, _mm256_storeu_pd,
+    _mm256_cvtps_pd of _mm_loadu_ps, _mm_storeu_ps of _mm256_cvtpd_ps, _mm256_storeu_pd, _mm256_loadu_pd,
     fn div(self, by: Self) -> Self { FourDoubles(_mm256_div_pd(self.0, by.0)) }
     fn min(self, other: Self) -> Self { FourDoubles(_mm256_min_pd(self.0, other.0)) }
     fn max(self, other: Self) -> Self { FourDoubles(_mm256_max_pd(self.0, other.0)) }
@@ -114,7 +120,7 @@ doubles! { FourDoubles, 4, _mm256_set1_pd,
 }
 
 doubles! { EightDoubles, 8, _mm512_set1_pd,
-    _mm512_cvtps_pd of _mm256_loadu_ps, _mm256_storeu_ps of _mm512_cvtpd_ps, _mm512_storeu_pd,
+    _mm512_cvtps_pd of _mm256_loadu_ps, _mm256_storeu_ps of _mm512_cvtpd_ps, _mm512_storeu_pd, _mm512_loadu_pd,
     fn div(self, by: Self) -> Self { EightDoubles(_mm512_div_pd(self.0, by.0)) }
     fn min(self, other: Self) -> Self { EightDoubles(_mm512_min_pd(self.0, other.0)) }
     fn max(self, other: Self) -> Self { EightDoubles(_mm512_max_pd(self.0, other.0)) }

@@ -102,6 +102,7 @@ impl<Q: BatchQuery, F: HitFilter> BatchQuery for Filtered<'_, Q, F> {
         hits: &Clear<'_>,
         exact: &Exact<'_>,
     ) -> u32 {
+        const { assert!(!Q::ROUNDED, "it sees hits in f32 alone") };
         if F::FILTERS {
             return hits.lanes;
         }

@@ -14,7 +14,7 @@ pub use count::Count;
 pub use every::Every;
 pub use filtered::{Filtered, HitFilter, Masks, NoFilter, Opacity};
 
-use super::exact::Exact;
+use super::exact::{Exact, place};
 use super::level::{Range, Simd};
 use super::slot::Slot;
 use crate::ray::Hit;
@@ -37,6 +37,9 @@ pub struct Clear<'a> {
 pub trait BatchQuery {
     /// True if the first hit ends a ray.
     const ANY: bool;
+    /// True if rays and triangles have been rounded from `f64`: filters leave room for that, and every
+    /// lane they let through comes to [`BatchQuery::decide`].
+    const ROUNDED: bool = false;
     /// True if hits end no ray, so that blocks may well have several: they are tested in full at once
     /// where that pays.
     const MANY: bool = false;
@@ -53,6 +56,20 @@ pub trait BatchQuery {
         hits: &Clear<'_>,
         exact: &Exact<'_>,
     ) -> u32;
+
+    /// Decides exactly whether the triangle in a lane of the block at `line` is hit.
+    #[inline(always)]
+    fn decide(
+        &mut self,
+        k: usize,
+        slot: &mut Slot,
+        (line, lane): (usize, usize),
+        exact: &Exact<'_>,
+    ) {
+        if let Some(hit) = exact.hit(slot.ray, place(line, lane)) {
+            self.take(k, slot, &hit, exact);
+        }
+    }
 
     /// Takes a hit in the ray's range for the slot numbered `k`.
     fn take(&mut self, k: usize, slot: &mut Slot, hit: &Hit, exact: &Exact<'_>);
