@@ -11,7 +11,7 @@ from ._errors import RopewalkError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ._ropewalk import Core, Rays
+    from ._ropewalk import Core, DoubleCore, DoubleRays, Rays
 
 _SURFACE = ("uv", "normal", "position")
 
@@ -21,18 +21,18 @@ class _Surface:
 
     __slots__ = ("_core", "_normal", "_position", "_rays", "_threads", "_uv", "geom_id", "prim_id", "t")
 
-    t: NDArray[np.float32]
+    t: NDArray[np.float32] | NDArray[np.float64]
     prim_id: NDArray[np.int32]
     geom_id: NDArray[np.int32]
-    _core: Core | None
-    _rays: Rays | None
+    _core: Any
+    _rays: Any
     _threads: int
 
     def _ray_ids(self) -> NDArray[np.int64] | None:
         return None
 
-    def _look(self, what: str) -> NDArray[np.float32]:
-        kept: NDArray[np.float32] | None = getattr(self, f"_{what}", None)
+    def _look(self, what: str) -> NDArray[Any]:
+        kept: NDArray[Any] | None = getattr(self, f"_{what}", None)
         if kept is not None:
             return kept
         assert self._core is not None and self._rays is not None
@@ -50,7 +50,7 @@ class _Surface:
         return values
 
     @property
-    def uv(self) -> NDArray[np.float32]:
+    def uv(self) -> NDArray[Any]:
         """Barycentric weights of vertices 1 and 2, shape (..., 2); NaN for a miss.
 
         A hit is at ``(1 - u - v) * v0 + u * v1 + v * v2`` (Embree's order). Both are 0 on primitives
@@ -59,7 +59,7 @@ class _Surface:
         return self._look("uv")
 
     @property
-    def normal(self) -> NDArray[np.float32]:
+    def normal(self) -> NDArray[Any]:
         """Unit normals of the surface, shape (..., 3); NaN for a miss.
 
         They point to the side from which the vertices run counter-clockwise, whichever side was hit.
@@ -67,7 +67,7 @@ class _Surface:
         return self._look("normal")
 
     @property
-    def position(self) -> NDArray[np.float32]:
+    def position(self) -> NDArray[Any]:
         """Points of the hits, shape (..., 3); NaN for a miss.
 
         On triangles from ``uv``, which is nearer to the surface than ``origin + t * direction`` in
@@ -92,7 +92,8 @@ class Hits(_Surface):
     """The nearest hit of each ray, in arrays of the rays' shape.
 
     Attributes:
-        t: float32, parameter of the hit in lengths of the ray's direction; inf for a miss.
+        t: parameter of the hit in lengths of the ray's direction; inf for a miss. float32, like all that is
+            not an id, or float64 in a scene of double precision.
         prim_id: int32, primitive within its mesh; -1 for a miss.
         geom_id: int32, mesh; -1 for a miss.
 
@@ -142,7 +143,7 @@ class HitLists(_Surface):
 
     Attributes:
         offsets: int64, one more than there are rays.
-        t: float32, parameters in lengths of the ray's direction.
+        t: float32 or float64 (see :class:`Hits`), parameters in lengths of the ray's direction.
         prim_id: int32, primitives within their meshes.
         geom_id: int32, meshes.
         shape: shape of the rays.
@@ -193,8 +194,8 @@ class HitLists(_Surface):
 
 
 def make_hits(
-    core: Core,
-    rays: Rays,
+    core: Core | DoubleCore,
+    rays: Rays | DoubleRays,
     threads: int,
     shape: tuple[int, ...],
     arrays: tuple[np.ndarray, ...],
@@ -207,8 +208,8 @@ def make_hits(
 
 
 def make_lists(
-    core: Core,
-    rays: Rays,
+    core: Core | DoubleCore,
+    rays: Rays | DoubleRays,
     threads: int,
     shape: tuple[int, ...],
     arrays: tuple[np.ndarray, ...],

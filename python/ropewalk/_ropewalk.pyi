@@ -10,6 +10,7 @@ def simd_level() -> Literal["scalar", "avx2", "avx512"]: ...
 def default_threads() -> int: ...
 
 _F32 = NDArray[np.float32]
+_F64 = NDArray[np.float64]
 _I32 = NDArray[np.int32]
 _I64 = NDArray[np.int64]
 _U32 = NDArray[np.uint32]
@@ -29,6 +30,60 @@ class Rays:
     ) -> Rays: ...
     def __len__(self) -> int: ...
     def first_invalid(self) -> int | None: ...
+
+@final
+class DoubleRays:
+    def __new__(
+        cls,
+        count: int,
+        origins: _F64,
+        directions: _F64,
+        t_min: _F64,
+        t_max: _F64,
+        masks: _U32 | None = None,
+        skip: _I32 | None = None,
+    ) -> DoubleRays: ...
+    def __len__(self) -> int: ...
+    def first_invalid(self) -> int | None: ...
+
+@final
+class DoubleCore:
+    @staticmethod
+    def build(
+        vertices: _F64,
+        faces: _U32,
+        starts: list[int],
+        masks: list[int],
+        preset: str,
+        threads: int,
+        progress: Callable[[float], object] | None = None,
+    ) -> DoubleCore: ...
+    def meshes(self) -> tuple[_F64, _U32]: ...
+    @property
+    def starts(self) -> list[int]: ...
+    @property
+    def masks(self) -> list[int]: ...
+    @property
+    def preset(self) -> str: ...
+    @property
+    def bounds(self) -> tuple[list[float], list[float]] | None: ...
+    def report(self) -> dict[str, object]: ...
+    def closest_hit(self, rays: DoubleRays, threads: int) -> tuple[_F64, _I32, _I32, int, int]: ...
+    def occluded(self, rays: DoubleRays, threads: int) -> tuple[NDArray[np.bool_], int, int]: ...
+    def count_hits(self, rays: DoubleRays, threads: int) -> tuple[_I32, int, int]: ...
+    def first_hits(
+        self, rays: DoubleRays, threads: int, k: int | None = None
+    ) -> tuple[_I64, _F64, _I32, _I32, int, int]: ...
+    def surface(
+        self,
+        what: str,
+        rays: DoubleRays,
+        t: _F64,
+        prim: _I32,
+        geom: _I32,
+        threads: int,
+        ray: _I64 | None = None,
+    ) -> tuple[_F64, int]: ...
 
 @final
 class Core:

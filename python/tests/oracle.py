@@ -1,4 +1,4 @@
-"""Brute force in NumPy, in float64, over what was rounded to float32.
+"""Brute force in NumPy, in float64, over what was rounded to ``dtype``, float32 unless said otherwise.
 
 The triangle test is that of docs/numerics.md, written down a second time. Where it depends on how
 products are rounded (a ray through an edge, a triangle seen edge-on) a ray is left undecided.
@@ -17,10 +17,10 @@ FILTER = 2.0**-11
 class Oracle:
     """All crossings of all rays and triangles."""
 
-    def __init__(self, triangles, origins, directions, t_min=0.0, t_max=np.inf):
-        tri = np.asarray(triangles, np.float32).astype(np.float64)
-        o = np.asarray(origins, np.float32)
-        d = np.asarray(directions, np.float32)
+    def __init__(self, triangles, origins, directions, t_min=0.0, t_max=np.inf, dtype=np.float32):
+        tri = np.asarray(triangles, dtype).astype(np.float64)
+        o = np.asarray(origins, dtype)
+        d = np.asarray(directions, dtype)
         n, rows = len(o), np.arange(len(o))
         kz = np.abs(d[:, 1]) > np.abs(d[:, 0])
         kz = np.where(np.abs(d[:, 2]) > np.abs(d[rows, kz.astype(int)]), 2, kz.astype(int))
@@ -53,17 +53,17 @@ class Oracle:
             depth = (u * a[2] + v * b[2] + w * c[2]) / det
             low = np.minimum(np.minimum(a[2], b[2]), c[2])
             high = np.maximum(np.maximum(a[2], b[2]), c[2])
-            t = (sz[:, None] * np.clip(depth, low, high)).astype(np.float32)
+            t = (sz[:, None] * np.clip(depth, low, high)).astype(dtype)
             degenerate = ~np.cross(tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0]).any(axis=1)
             touching = np.minimum(np.minimum(np.abs(u), np.abs(v)), np.abs(w)) <= small
             unsure = ~clearly & (touching | (np.abs(det) < FILTER * products)) & ~degenerate
-            in_range = (t >= np.float32(t_min)) & (t <= np.float32(t_max)) & np.isfinite(t)
+            in_range = (t >= dtype(t_min)) & (t <= dtype(t_max)) & np.isfinite(t)
             valid = np.isfinite(o).all(1) & np.isfinite(d).all(1) & d.any(1)
         #: True for each ray and triangle that meet.
         self.hit = ~mixed & in_range & ~degenerate & valid[:, None]
-        self.t = np.where(self.hit, t, np.float32(np.inf))
+        self.t = np.where(self.hit, t, np.inf)
         with np.errstate(all="ignore"):
-            self.uv = np.stack([v / det, w / det], -1).astype(np.float32)
+            self.uv = np.stack([v / det, w / det], -1).astype(dtype)
         #: Rays that meet every triangle clearly or not at all.
         self.sure = ~(unsure & valid[:, None]).any(axis=1)
         assert self.t.shape == (n, len(tri))
@@ -71,7 +71,7 @@ class Oracle:
     def only(self, allowed):
         """The same, with crossings of some rays and triangles alone."""
         self.hit = self.hit & allowed
-        self.t = np.where(self.hit, self.t, np.float32(np.inf))
+        self.t = np.where(self.hit, self.t, np.inf)
         return self
 
     def closest(self):

@@ -41,10 +41,12 @@ def refused(error, argument, index, text, call):
 def test_vertices_that_are_not_finite(value):
     vertices = V.astype(np.float64)
     vertices[2, 1] = value
-    refused(ArgumentError, "vertices", 2, "finite", lambda: ropewalk.Scene(vertices, F))
     meshes = [(V, F), (vertices, F)]
     name = "meshes[1].vertices"
-    refused(ArgumentError, name, 2, "finite", lambda: ropewalk.Scene.from_meshes(meshes))
+    for precision in ("single",) if abs(value) == 1e39 else ("auto", "single", "double"):
+        kind = {"precision": precision}
+        refused(ArgumentError, "vertices", 2, "finite", lambda: ropewalk.Scene(vertices, F, **kind))
+        refused(ArgumentError, name, 2, "finite", lambda: ropewalk.Scene.from_meshes(meshes, **kind))
 
 
 @pytest.mark.parametrize("index", [-1, 4, 2**31, 2**32, 2**32 + 1, -(2**32), 2**62])
@@ -271,10 +273,11 @@ def test_meshes_that_are_none():
 def test_far_from_the_origin():
     far = V.astype(np.float64) / 3 + 1e7
     with pytest.warns(ropewalk.PrecisionWarning, match="vertices"):
-        ropewalk.Scene(far, F)
+        ropewalk.Scene(far, F, precision="single")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        ropewalk.Scene(V.astype(np.float64) / 3, F)
+        ropewalk.Scene(V.astype(np.float64) / 3, F, precision="single")
+        assert ropewalk.Scene(far, F).precision == "double"
         ropewalk.Scene(far.astype(np.float32), F[:0])
         ropewalk.Scene(100 * V + np.float64(1e3), F)
 

@@ -46,10 +46,11 @@ pub struct Core {
 }
 
 /// Watches a build for Python.
-struct Watch<'a> {
-    stop: &'a AtomicBool,
+pub struct Watch<'a> {
+    /// Set when the build is to stop.
+    pub stop: &'a AtomicBool,
     /// The largest share done so far, as the bits of an `f64`, which are ordered as the numbers are.
-    done: &'a AtomicU64,
+    pub done: &'a AtomicU64,
 }
 
 impl Monitor for Watch<'_> {
@@ -191,26 +192,10 @@ impl Core {
 
     /// Figures of the build and of the tree.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (report, stats) = (&self.report, &self.report.tree);
-        let figures = PyDict::new(py);
-        figures.set_item("preset", self.preset.name())?;
-        figures.set_item("meshes", self.masks.len())?;
-        figures.set_item("primitives", report.primitives)?;
-        figures.set_item("degenerate", report.degenerate)?;
-        figures.set_item("references", stats.references)?;
-        figures.set_item("duplication", report.duplication)?;
-        figures.set_item("inner_nodes", stats.inner_nodes)?;
-        figures.set_item("leaves", stats.leaves)?;
-        figures.set_item("empty_leaves", stats.empty_leaves)?;
-        figures.set_item("max_depth", stats.max_depth)?;
+        let figures = figures(py, &self.report, self.preset, self.masks.len())?;
         figures.set_item("tree_bytes", self.tree.bytes())?;
         let shapes = self.geometry.len() * (size_of::<Shape>() + size_of::<Sides>());
         figures.set_item("geometry_bytes", shapes)?;
-        figures.set_item("predicted_steps", stats.predicted_inner_visits)?;
-        figures.set_item("predicted_leaves", stats.predicted_leaf_visits)?;
-        figures.set_item("predicted_tests", stats.predicted_intersection_tests)?;
-        figures.set_item("leaf_sizes", stats.leaf_sizes.clone())?;
-        figures.set_item("seconds", report.seconds)?;
         Ok(figures)
     }
 
@@ -238,7 +223,7 @@ impl Core {
                 }
                 None => drop(caster.closest_hit_into(rays, t, prim)),
             });
-            self.number(prim, geom);
+            number(&self.starts, prim, geom);
             invalid
         };
         let invalid = total(work::for_each(py, threads, tasks, trace)?);
@@ -339,7 +324,7 @@ impl Core {
             t.copy_from_slice(&part.t);
             let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
             prim.copy_from_slice(&part.prim_id);
-            self.number(prim, geom);
+            number(&self.starts, prim, geom);
         })?;
         let (t, prim, geom) = (t.into_pyarray(py), prim.into_pyarray(py), geom.into_pyarray(py));
         Ok((offsets.into_pyarray(py), t, prim, geom, invalid.count, invalid.first))
@@ -377,7 +362,7 @@ impl Core {
             let mut lost = 0;
             for (i, value) in range.zip(values.chunks_exact_mut(width)) {
                 value.fill(f32::NAN);
-                let Some(prim) = self.primitive(prim[i], geom[i]) else { continue };
+                let Some(prim) = primitive(&self.starts, prim[i], geom[i]) else { continue };
                 let ray = ray.map_or(i, |ray| ray[i] as usize);
                 let line = (ray < view.count).then(|| view.line(ray));
                 let found = line.is_some_and(|(origin, dir)| {
@@ -432,11 +417,7 @@ impl Core {
         progress: Option<Py<PyAny>>,
         one_mesh: bool,
     ) -> PyResult<Core> {
-        let Some(preset) = Preset::ALL.into_iter().find(|p| p.name() == preset) else {
-            let names = Preset::ALL.map(Preset::name).join(", ");
-            let message = format!("preset is '{preset}'; expected one of {names}");
-            return Err(error::argument("preset", None, message));
-        };
+        let preset = self::preset(preset)?;
         // Work with 0 threads runs in the current pool, which is the one that `watch` chose.
         let settings =
             BuildSettings { threads: usize::from(threads == 1), ..BuildSettings::preset(preset) };
@@ -467,56 +448,6 @@ impl Core {
         if self.tree.bytes() >= LARGE_TREE { LARGE_BLOCK } else { BLOCK }
     }
 
-    /// The masks of rays if any ray of the range may miss any mesh by them: filters cost coherent rays
-    /// their beams.
-    fn masks_that_refuse<'a>(
-        &self,
-        masks: Option<&'a [u32]>,
-        range: &Range<usize>,
-    ) -> Option<&'a [u32]> {
-        let Some(masks) = masks else {
-            return self.masks.contains(&0).then_some(&[!0]);
-        };
-        let common = self.masks.iter().fold(!0, |all, mask| all & mask);
-        let asked = if masks.len() == 1 { masks } else { &masks[range.clone()] };
-        asked.iter().any(|mask| mask & common == 0).then_some(masks)
-    }
-
-    /// The primitive numbered through all meshes; `None` for a miss and for what is not there.
-    fn primitive(&self, prim: i32, geom: i32) -> Option<u32> {
-        let (prim, geom) = (u32::try_from(prim).ok()?, usize::try_from(geom).ok()?);
-        let (start, end) = (*self.starts.get(geom)?, *self.starts.get(geom + 1)?);
-        let prim = start.checked_add(prim)?;
-        (prim < end).then_some(prim)
-    }
-
-    /// The mesh of a primitive.
-    fn mesh(&self, prim: u32) -> usize {
-        if self.masks.len() == 1 {
-            return 0;
-        }
-        self.starts.partition_point(|&start| start <= prim) - 1
-    }
-
-    /// Numbers primitives within their meshes; misses become -1.
-    fn number(&self, prim: &mut [u32], geom: &mut [i32]) {
-        if self.masks.len() == 1 {
-            for (prim, geom) in prim.iter().zip(geom) {
-                *geom = -i32::from(*prim == u32::MAX);
-            }
-            return;
-        }
-        for (prim, geom) in prim.iter_mut().zip(geom) {
-            if *prim == u32::MAX {
-                *geom = -1;
-                continue;
-            }
-            let mesh = self.mesh(*prim);
-            *prim -= self.starts[mesh];
-            *geom = mesh as i32;
-        }
-    }
-
     /// Interleaves some rays and has them traced, with a filter where one is needed.
     fn block<'a>(
         &'a self,
@@ -527,7 +458,7 @@ impl Core {
         thread_local! {
             static RAYS: RefCell<Vec<Ray>> = const { RefCell::new(Vec::new()) };
         }
-        let masks = self.masks_that_refuse(view.masks, &range);
+        let masks = masks_that_refuse(&self.masks, view.masks, &range);
         let filter = (masks.is_some() || view.skip.is_some()).then_some(RayFilter {
             first: range.start,
             core: self,
@@ -557,9 +488,95 @@ impl HitFilter for RayFilter<'_> {
         let ray = self.first + ray;
         let core = self.core;
         self.skip.is_none_or(|skip| one(skip, ray) != hit.prim_id)
-            && self
-                .masks
-                .is_none_or(|masks| one(masks, ray) & core.masks[core.mesh(hit.prim_id)] != 0)
+            && self.masks.is_none_or(|masks| {
+                one(masks, ray) & core.masks[mesh(&core.starts, hit.prim_id)] != 0
+            })
+    }
+}
+
+/// The preset of a name.
+pub fn preset(name: &str) -> PyResult<Preset> {
+    Preset::ALL.into_iter().find(|preset| preset.name() == name).ok_or_else(|| {
+        let names = Preset::ALL.map(Preset::name).join(", ");
+        let message = format!("preset is '{name}'; expected one of {names}");
+        error::argument("preset", None, message)
+    })
+}
+
+/// Figures of a build, those of its bytes left to the caller.
+pub fn figures<'py>(
+    py: Python<'py>,
+    report: &BuildReport,
+    preset: Preset,
+    meshes: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (figures, stats) = (PyDict::new(py), &report.tree);
+    figures.set_item("preset", preset.name())?;
+    figures.set_item("meshes", meshes)?;
+    figures.set_item("primitives", report.primitives)?;
+    figures.set_item("degenerate", report.degenerate)?;
+    figures.set_item("references", stats.references)?;
+    figures.set_item("duplication", report.duplication)?;
+    figures.set_item("inner_nodes", stats.inner_nodes)?;
+    figures.set_item("leaves", stats.leaves)?;
+    figures.set_item("empty_leaves", stats.empty_leaves)?;
+    figures.set_item("max_depth", stats.max_depth)?;
+    figures.set_item("predicted_steps", stats.predicted_inner_visits)?;
+    figures.set_item("predicted_leaves", stats.predicted_leaf_visits)?;
+    figures.set_item("predicted_tests", stats.predicted_intersection_tests)?;
+    figures.set_item("leaf_sizes", stats.leaf_sizes.clone())?;
+    figures.set_item("seconds", report.seconds)?;
+    Ok(figures)
+}
+
+/// The masks of rays if any ray of the range may miss any mesh by them: filters cost coherent rays
+/// their beams.
+pub fn masks_that_refuse<'a>(
+    meshes: &[u32],
+    masks: Option<&'a [u32]>,
+    range: &Range<usize>,
+) -> Option<&'a [u32]> {
+    let Some(masks) = masks else {
+        return meshes.contains(&0).then_some(&[!0]);
+    };
+    let common = meshes.iter().fold(!0, |all, mask| all & mask);
+    let asked = if masks.len() == 1 { masks } else { &masks[range.clone()] };
+    asked.iter().any(|mask| mask & common == 0).then_some(masks)
+}
+
+/// The primitive numbered through all meshes, the first ones of which are `starts`; `None` for a miss
+/// and for what is not there.
+pub fn primitive(starts: &[u32], prim: i32, geom: i32) -> Option<u32> {
+    let (prim, geom) = (u32::try_from(prim).ok()?, usize::try_from(geom).ok()?);
+    let (start, end) = (*starts.get(geom)?, *starts.get(geom + 1)?);
+    let prim = start.checked_add(prim)?;
+    (prim < end).then_some(prim)
+}
+
+/// The mesh of a primitive.
+pub fn mesh(starts: &[u32], prim: u32) -> usize {
+    if starts.len() == 2 {
+        return 0;
+    }
+    starts.partition_point(|&start| start <= prim) - 1
+}
+
+/// Numbers primitives within their meshes; misses become -1.
+pub fn number(starts: &[u32], prim: &mut [u32], geom: &mut [i32]) {
+    if starts.len() == 2 {
+        for (prim, geom) in prim.iter().zip(geom) {
+            *geom = -i32::from(*prim == u32::MAX);
+        }
+        return;
+    }
+    for (prim, geom) in prim.iter_mut().zip(geom) {
+        if *prim == u32::MAX {
+            *geom = -1;
+            continue;
+        }
+        let mesh = mesh(starts, *prim);
+        *prim -= starts[mesh];
+        *geom = mesh as i32;
     }
 }
 
@@ -589,29 +606,31 @@ fn triangles(meshes: &[Mesh<'_>]) -> Result<Parts, Failure> {
     Ok((geometry, starts))
 }
 
-fn total(parts: Vec<Invalid>) -> Invalid {
+/// All of them together.
+pub fn total(parts: Vec<Invalid>) -> Invalid {
     parts.into_iter().fold(Invalid::default(), Invalid::and)
 }
 
 /// Rays of a task, `most` at most.
-fn block(rays: usize, threads: usize, most: usize) -> usize {
+pub fn block(rays: usize, threads: usize, most: usize) -> usize {
     match threads {
         1 => most,
         _ => rays.div_ceil(threads.max(1) * TASKS_PER_THREAD).clamp(MIN_BLOCK, most),
     }
 }
 
-fn blocks(rays: usize, block: usize) -> impl Iterator<Item = Range<usize>> {
+/// The ranges of some blocks of rays.
+pub fn blocks(rays: usize, block: usize) -> impl Iterator<Item = Range<usize>> {
     (0..rays).step_by(block).map(move |start| start..rays.min(start + block))
 }
 
 /// Splits `n` entries off the front.
-fn split<'a, T>(row: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+pub fn split<'a, T>(row: &mut &'a mut [T], n: usize) -> &'a mut [T] {
     row.split_off_mut(..n).expect("rows are as long as their parts together")
 }
 
 /// `len` if so many values can be had.
-fn checked<T>(len: usize) -> PyResult<usize> {
+pub fn checked<T>(len: usize) -> PyResult<usize> {
     match Vec::<T>::new().try_reserve_exact(len) {
         Ok(()) => Ok(len),
         Err(_) => {
@@ -621,6 +640,7 @@ fn checked<T>(len: usize) -> PyResult<usize> {
     }
 }
 
-fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> PyResult<Vec<T>> {
+/// So many zeros, if they can be had.
+pub fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> PyResult<Vec<T>> {
     Ok(vec![T::zeroed(); checked::<T>(len)?])
 }

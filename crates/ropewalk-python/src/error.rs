@@ -4,6 +4,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use ropewalk::GeometryError;
 use ropewalk::build::BuildError;
+use ropewalk::double::DoubleGeometryError;
 use ropewalk::wide::CompileError;
 use ropewalk_scene::{Fault, SceneError};
 use std::any::Any;
@@ -44,6 +45,8 @@ pub fn panic(payload: Box<dyn Any + Send>) -> PyErr {
 pub enum Failure {
     /// A mesh, by its number, cannot be used.
     Mesh(usize, GeometryError),
+    /// Meshes in `f64` cannot be used; what names a vertex or a face has been checked before.
+    Double(DoubleGeometryError),
     /// The tree cannot be built.
     Build(BuildError),
     /// The file cannot be read.
@@ -79,6 +82,7 @@ impl Failure {
                     _ => argument(&name("faces"), None, error.to_string()),
                 }
             }
+            Failure::Double(error) => argument("vertices", None, error.to_string()),
             Failure::Build(error) => match &error {
                 BuildError::Compile(
                     CompileError::Memory { .. } | CompileError::TooLarge { .. },

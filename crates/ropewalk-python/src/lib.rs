@@ -8,6 +8,7 @@
 #![allow(clippy::too_many_arguments)]
 
 mod core;
+mod double;
 mod error;
 mod rays;
 mod state;
@@ -23,6 +24,8 @@ mod _ropewalk {
 
     #[pymodule_export]
     use crate::core::Core;
+    #[pymodule_export]
+    use crate::double::{DoubleCore, DoubleRays};
     #[pymodule_export]
     use crate::rays::Rays;
 

@@ -1,0 +1,514 @@
+//! A scene in `f64` with its tree, and the batch queries: what [`Core`](crate::core::Core) is in `f32`.
+
+use crate::core::{Watch, blocks, checked, split, total, zeros};
+use crate::error::{self, Failure};
+use crate::rays::{Invalid, one};
+use crate::surface::Surface;
+use crate::work;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use ropewalk::build::{BuildReport, BuildSettings, Preset};
+use ropewalk::double::{
+    DoubleAllHits, DoubleCaster, DoubleFilter, DoubleGeometry, DoubleHit, DoubleRay, DoubleTree,
+};
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+/// Rays of a task: a megabyte.
+const BLOCK: usize = 16_384;
+
+/// A batch of rays in `f64`: arrays with one entry a ray, or with one for all of them.
+#[pyclass(frozen, module = "ropewalk._ropewalk")]
+pub struct DoubleRays {
+    count: usize,
+    origins: Py<PyArray1<f64>>,
+    directions: Py<PyArray1<f64>>,
+    t_min: Py<PyArray1<f64>>,
+    t_max: Py<PyArray1<f64>>,
+    masks: Option<Py<PyArray1<u32>>>,
+    skip: Option<Py<PyArray1<i32>>>,
+}
+
+#[pymethods]
+impl DoubleRays {
+    /// Arrays must be contiguous: three numbers a ray in `origins` and `directions`, one in the others.
+    #[new]
+    #[pyo3(signature = (count, origins, directions, t_min, t_max, masks=None, skip=None))]
+    fn new(
+        py: Python<'_>,
+        count: usize,
+        origins: Py<PyArray1<f64>>,
+        directions: Py<PyArray1<f64>>,
+        t_min: Py<PyArray1<f64>>,
+        t_max: Py<PyArray1<f64>>,
+        masks: Option<Py<PyArray1<u32>>>,
+        skip: Option<Py<PyArray1<i32>>>,
+    ) -> PyResult<DoubleRays> {
+        let rays = DoubleRays { count, origins, directions, t_min, t_max, masks, skip };
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let fits = |len: usize, each: usize| {
+            len == each || each.checked_mul(count).is_some_and(|needed| len == needed)
+        };
+        let fit = fits(view.origins.len(), 3)
+            && fits(view.directions.len(), 3)
+            && fits(view.t_min.len(), 1)
+            && fits(view.t_max.len(), 1)
+            && view.masks.is_none_or(|masks| fits(masks.len(), 1))
+            && view.skip.is_none_or(|skip| fits(skip.len(), 1));
+        if !fit {
+            return Err(error::argument("rays", None, "arrays of rays differ in length".into()));
+        }
+        drop(arrays);
+        Ok(rays)
+    }
+
+    /// Number of rays.
+    fn __len__(&self) -> usize {
+        self.count
+    }
+
+    /// Index of the first ray that can hit nothing; see `DoubleRay::is_valid`.
+    fn first_invalid(&self, py: Python<'_>) -> PyResult<Option<usize>> {
+        let arrays = self.borrow(py)?;
+        let view = arrays.view()?;
+        Ok(py.detach(|| (0..view.count).find(|&i| !view.ray(i).is_valid())))
+    }
+}
+
+impl DoubleRays {
+    fn borrow<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py>> {
+        fn read<'py, T: numpy::Element>(
+            py: Python<'py>,
+            array: &Py<PyArray1<T>>,
+        ) -> PyResult<PyReadonlyArray1<'py, T>> {
+            Ok(array.bind(py).try_readonly()?)
+        }
+        Ok(Borrowed {
+            count: self.count,
+            origins: read(py, &self.origins)?,
+            directions: read(py, &self.directions)?,
+            t_min: read(py, &self.t_min)?,
+            t_max: read(py, &self.t_max)?,
+            masks: self.masks.as_ref().map(|masks| read(py, masks)).transpose()?,
+            skip: self.skip.as_ref().map(|skip| read(py, skip)).transpose()?,
+        })
+    }
+}
+
+/// Borrowed arrays.
+struct Borrowed<'py> {
+    count: usize,
+    origins: PyReadonlyArray1<'py, f64>,
+    directions: PyReadonlyArray1<'py, f64>,
+    t_min: PyReadonlyArray1<'py, f64>,
+    t_max: PyReadonlyArray1<'py, f64>,
+    masks: Option<PyReadonlyArray1<'py, u32>>,
+    skip: Option<PyReadonlyArray1<'py, i32>>,
+}
+
+impl Borrowed<'_> {
+    fn view(&self) -> PyResult<View<'_>> {
+        let masks = self.masks.as_ref().map(|masks| masks.as_slice()).transpose()?;
+        let skip = self.skip.as_ref().map(|skip| skip.as_slice()).transpose()?;
+        Ok(View {
+            count: self.count,
+            origins: self.origins.as_slice()?,
+            directions: self.directions.as_slice()?,
+            t_min: self.t_min.as_slice()?,
+            t_max: self.t_max.as_slice()?,
+            masks,
+            skip: skip.map(bytemuck::cast_slice),
+        })
+    }
+}
+
+/// The numbers of some rays.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    count: usize,
+    origins: &'a [f64],
+    directions: &'a [f64],
+    t_min: &'a [f64],
+    t_max: &'a [f64],
+    masks: Option<&'a [u32]>,
+    /// Primitives to ignore, numbered through all meshes; `u32::MAX` is none.
+    skip: Option<&'a [u32]>,
+}
+
+impl View<'_> {
+    fn ray(&self, i: usize) -> DoubleRay {
+        let three = |values: &[f64]| {
+            let at = if values.len() == 3 { 0 } else { 3 * i };
+            [values[at], values[at + 1], values[at + 2]]
+        };
+        let (origin, dir) = (three(self.origins), three(self.directions));
+        DoubleRay { origin, dir, t_min: one(self.t_min, i), t_max: one(self.t_max, i) }
+    }
+
+    /// Some rays, and how many of them hit nothing whatever the scene, their ranges aside.
+    fn rays(&self, range: Range<usize>) -> (Vec<DoubleRay>, Invalid) {
+        let mut invalid = Invalid::default();
+        let start = range.start;
+        let rays: Vec<DoubleRay> = range.map(|i| self.ray(i)).collect();
+        for (i, ray) in rays.iter().enumerate() {
+            let has_range = !ray.t_min.is_nan() && !ray.t_max.is_nan();
+            let whole = DoubleRay::new(ray.origin, ray.dir);
+            if !has_range || !whole.is_valid() {
+                invalid = invalid.and(Invalid { count: 1, first: start + i });
+            }
+        }
+        (rays, invalid)
+    }
+}
+
+/// Meshes in `f64` and the tree over them. It never changes.
+#[pyclass(frozen, module = "ropewalk._ropewalk")]
+pub struct DoubleCore {
+    geometry: DoubleGeometry,
+    tree: DoubleTree,
+    report: BuildReport,
+    /// The first primitive of each mesh, and the number of primitives.
+    starts: Vec<u32>,
+    /// Masks of the meshes.
+    masks: Vec<u32>,
+    preset: Preset,
+}
+
+/// Parameters, primitives and meshes of hits, how many rays were invalid and which was the first.
+type Answer<'py> =
+    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<i32>>, usize, usize);
+
+/// Parameters and primitives of a block.
+type TAndPrim<'a> = (&'a mut [f64], &'a mut [i32]);
+
+/// Vertices and faces.
+type Mesh<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
+
+/// The same in rows that begin at the first array's entries.
+type Rows<'py> = (
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<i32>>,
+    Bound<'py, PyArray1<i32>>,
+    usize,
+    usize,
+);
+
+#[pymethods]
+impl DoubleCore {
+    /// Builds a tree over the vertices and faces of all meshes one after another; `starts` are the first
+    /// face of each mesh and the number of faces.
+    #[staticmethod]
+    #[pyo3(signature = (vertices, faces, starts, masks, preset, threads, progress=None))]
+    fn build(
+        py: Python<'_>,
+        vertices: PyReadonlyArray2<'_, f64>,
+        faces: PyReadonlyArray2<'_, u32>,
+        starts: Vec<u32>,
+        masks: Vec<u32>,
+        preset: &str,
+        threads: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<DoubleCore> {
+        let preset = crate::core::preset(preset)?;
+        let sound = starts.len() == masks.len() + 1 && starts.is_sorted();
+        let count = faces.as_slice()?.len() / 3;
+        if !sound || starts.first() != Some(&0) || starts.last().map(|&n| n as usize) != Some(count)
+        {
+            return Err(error::argument("starts", None, "they do not fit the faces".into()));
+        }
+        let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
+        let (faces, _) = faces.as_slice()?.as_chunks::<3>();
+        let settings =
+            BuildSettings { threads: usize::from(threads == 1), ..BuildSettings::preset(preset) };
+        let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
+        let show = |py: Python<'_>| match &progress {
+            Some(progress) => {
+                progress.call1(py, (f64::from_bits(done.load(Ordering::Relaxed)),)).map(drop)
+            }
+            None => Ok(()),
+        };
+        let job = || {
+            let geometry = DoubleGeometry::from_triangles(vertices.to_vec(), faces.to_vec())
+                .map_err(Failure::Double)?;
+            let watch = Watch { stop: &stop, done: &done };
+            let (tree, report) = geometry.build(&settings, &watch).map_err(Failure::Build)?;
+            Ok((geometry, tree, report))
+        };
+        let (geometry, tree, report) = work::watch(py, threads, &stop, show, job)?
+            .map_err(|failure: Failure| failure.into_exception(true))?;
+        if let Some(progress) = &progress {
+            progress.call1(py, (1.0,))?;
+        }
+        Ok(DoubleCore { geometry, tree, report, starts, masks, preset })
+    }
+
+    /// Vertices and faces, from which [`DoubleCore::build`] makes the same again.
+    fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Mesh<'py>> {
+        let (vertices, faces) = (self.geometry.vertices(), self.geometry.faces());
+        let vertices = PyArray1::from_slice(py, vertices.as_flattened());
+        let faces = PyArray1::from_slice(py, faces.as_flattened());
+        let rows = |len: usize| [len / 3, 3];
+        Ok((vertices.reshape(rows(vertices.len()?))?, faces.reshape(rows(faces.len()?))?))
+    }
+
+    /// The first primitive of each mesh, and the number of primitives.
+    #[getter]
+    fn starts(&self) -> Vec<u32> {
+        self.starts.clone()
+    }
+
+    /// Masks of the meshes.
+    #[getter]
+    fn masks(&self) -> Vec<u32> {
+        self.masks.clone()
+    }
+
+    /// Name of the preset.
+    #[getter]
+    fn preset(&self) -> &'static str {
+        self.preset.name()
+    }
+
+    /// Lower and upper corner of the box of everything.
+    #[getter]
+    fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
+        self.geometry.bounds()
+    }
+
+    /// Figures of the build and of the tree.
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let figures = crate::core::figures(py, &self.report, self.preset, self.masks.len())?;
+        figures.set_item("tree_bytes", self.tree.bytes())?;
+        figures.set_item("geometry_bytes", self.geometry.bytes())?;
+        Ok(figures)
+    }
+
+    /// Parameter, primitive and mesh of the first hit of each ray; infinity, -1 and -1 for a miss.
+    fn closest_hit<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &DoubleRays,
+        threads: usize,
+    ) -> PyResult<Answer<'py>> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let n = view.count;
+        let (mut t, mut prim, mut geom) = (zeros::<f64>(n)?, zeros::<i32>(n)?, zeros::<i32>(n)?);
+        let block = crate::core::block(n, threads, BLOCK);
+        let chunks = t.chunks_mut(block).zip(prim.chunks_mut(block)).zip(geom.chunks_mut(block));
+        let tasks = blocks(n, block).zip(chunks).collect();
+        let trace = |(range, ((t, prim), geom)): (Range<usize>, (TAndPrim<'_>, _))| {
+            let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
+            let (rays, invalid) = view.rays(range.clone());
+            match self.filter(&view, &range) {
+                Some(filter) => {
+                    self.caster().with_filter(filter).closest_hit_into(&rays, t, prim);
+                }
+                None => self.caster().closest_hit_into(&rays, t, prim),
+            }
+            crate::core::number(&self.starts, prim, geom);
+            invalid
+        };
+        let invalid = total(work::for_each(py, threads, tasks, trace)?);
+        let (t, prim, geom) = (t.into_pyarray(py), prim.into_pyarray(py), geom.into_pyarray(py));
+        Ok((t, prim, geom, invalid.count, invalid.first))
+    }
+
+    /// Whether each ray hits anything.
+    fn occluded<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &DoubleRays,
+        threads: usize,
+    ) -> PyResult<(Bound<'py, PyArray1<bool>>, usize, usize)> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let mut hit = vec![false; checked::<bool>(view.count)?];
+        let block = crate::core::block(view.count, threads, BLOCK);
+        let tasks = blocks(view.count, block).zip(hit.chunks_mut(block)).collect();
+        let trace = |(range, hit): (Range<usize>, &mut [bool])| {
+            let (rays, invalid) = view.rays(range.clone());
+            match self.filter(&view, &range) {
+                Some(filter) => self.caster().with_filter(filter).occluded_into(&rays, hit),
+                None => self.caster().occluded_into(&rays, hit),
+            }
+            invalid
+        };
+        let invalid = total(work::for_each(py, threads, tasks, trace)?);
+        Ok((hit.into_pyarray(py), invalid.count, invalid.first))
+    }
+
+    /// The number of primitives that each ray hits.
+    fn count_hits<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &DoubleRays,
+        threads: usize,
+    ) -> PyResult<(Bound<'py, PyArray1<i32>>, usize, usize)> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let mut counts = zeros::<i32>(view.count)?;
+        let block = crate::core::block(view.count, threads, BLOCK);
+        let tasks = blocks(view.count, block).zip(counts.chunks_mut(block)).collect();
+        let trace = |(range, counts): (Range<usize>, &mut [i32])| {
+            let (rays, invalid) = view.rays(range.clone());
+            let found = match self.filter(&view, &range) {
+                Some(filter) => self.caster().with_filter(filter).count_hits(&rays),
+                None => self.caster().count_hits(&rays),
+            };
+            counts.copy_from_slice(bytemuck::cast_slice(&found));
+            invalid
+        };
+        let invalid = total(work::for_each(py, threads, tasks, trace)?);
+        Ok((counts.into_pyarray(py), invalid.count, invalid.first))
+    }
+
+    /// The first `k` hits of each ray in order, or all of them.
+    #[pyo3(signature = (rays, threads, k=None))]
+    fn first_hits<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &DoubleRays,
+        threads: usize,
+        k: Option<usize>,
+    ) -> PyResult<Rows<'py>> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let (n, k) = (view.count, k.unwrap_or(usize::MAX));
+        let ranges = blocks(n, crate::core::block(n, threads, BLOCK)).collect();
+        let trace = |range: Range<usize>| {
+            let (rays, invalid) = view.rays(range.clone());
+            let all = match self.filter(&view, &range) {
+                Some(filter) => self.caster().with_filter(filter).first_hits(&rays, k),
+                None => self.caster().first_hits(&rays, k),
+            };
+            (all, invalid)
+        };
+        let (parts, invalid): (Vec<DoubleAllHits>, Vec<Invalid>) =
+            work::for_each(py, threads, ranges, trace)?.into_iter().unzip();
+        let invalid = total(invalid);
+        let found = parts.iter().map(|part| part.t.len()).sum();
+        let mut offsets = zeros::<i64>(n + 1)?;
+        let (mut t, mut prim, mut geom) =
+            (zeros::<f64>(found)?, zeros::<i32>(found)?, zeros::<i32>(found)?);
+        let mut tasks = Vec::with_capacity(parts.len());
+        let (mut ends, mut to) = (&mut offsets[1..], (&mut t[..], &mut prim[..], &mut geom[..]));
+        let mut start = 0;
+        for part in parts {
+            let len = part.t.len();
+            let row = (split(&mut to.0, len), split(&mut to.1, len), split(&mut to.2, len));
+            let count = part.offsets.len() - 1;
+            tasks.push((part, start, split(&mut ends, count), row));
+            start += len;
+        }
+        work::for_each(py, threads, tasks, |(part, start, ends, (t, prim, geom))| {
+            for (end, offset) in ends.iter_mut().zip(&part.offsets[1..]) {
+                *end = (start + offset) as i64;
+            }
+            t.copy_from_slice(&part.t);
+            let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
+            prim.copy_from_slice(&part.prim_id);
+            crate::core::number(&self.starts, prim, geom);
+        })?;
+        let (t, prim, geom) = (t.into_pyarray(py), prim.into_pyarray(py), geom.into_pyarray(py));
+        Ok((offsets.into_pyarray(py), t, prim, geom, invalid.count, invalid.first))
+    }
+
+    /// Surface coordinates, unit normals or positions of hits, by `what`, and how many of the hits
+    /// are none: rays have been changed since. `ray` names the ray of each hit, or each ray has one.
+    #[pyo3(signature = (what, rays, t, prim, geom, threads, ray=None))]
+    fn surface<'py>(
+        &self,
+        py: Python<'py>,
+        what: &str,
+        rays: &DoubleRays,
+        t: PyReadonlyArray1<'py, f64>,
+        prim: PyReadonlyArray1<'py, i32>,
+        geom: PyReadonlyArray1<'py, i32>,
+        threads: usize,
+        ray: Option<PyReadonlyArray1<'py, i64>>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, usize)> {
+        let arrays = rays.borrow(py)?;
+        let view = arrays.view()?;
+        let (t, prim, geom) = (t.as_slice()?, prim.as_slice()?, geom.as_slice()?);
+        let ray = ray.as_ref().map(|ray| ray.as_slice()).transpose()?;
+        let n = t.len();
+        let surface = Surface::named(what);
+        let rows = ray.map_or(view.count, <[i64]>::len);
+        if prim.len() != n || geom.len() != n || rows != n {
+            return Err(error::argument("hits", None, "arrays of hits differ in length".into()));
+        }
+        let width = surface.width();
+        let mut values = zeros::<f64>(n * width)?;
+        let block = crate::core::block(n, threads, BLOCK);
+        let tasks = blocks(n, block).zip(values.chunks_mut(block * width)).collect();
+        let look = |(range, values): (Range<usize>, &mut [f64])| {
+            let mut lost = 0;
+            for (i, value) in range.zip(values.chunks_exact_mut(width)) {
+                value.fill(f64::NAN);
+                let Some(prim) = crate::core::primitive(&self.starts, prim[i], geom[i]) else {
+                    continue;
+                };
+                let ray = ray.map_or(i, |ray| ray[i] as usize);
+                let ray = (ray < view.count).then(|| view.ray(ray).with_range(t[i], t[i]));
+                let hit = ray.and_then(|ray| self.geometry.intersect(prim, &ray));
+                if let Some(hit) = hit {
+                    self.look(surface, &hit, value);
+                }
+                lost += usize::from(hit.is_none());
+            }
+            lost
+        };
+        let lost = work::for_each(py, threads, tasks, look)?.into_iter().sum();
+        Ok((values.into_pyarray(py).reshape([n, width])?, lost))
+    }
+}
+
+impl DoubleCore {
+    fn caster(&self) -> DoubleCaster<'_> {
+        DoubleCaster::new(&self.tree, &self.geometry).with_threads(1)
+    }
+
+    fn look(&self, surface: Surface, hit: &DoubleHit, value: &mut [f64]) {
+        match surface {
+            Surface::Coordinates => value.copy_from_slice(&[hit.u, hit.v]),
+            Surface::Normal => value.copy_from_slice(&self.geometry.normal(hit.prim_id)),
+            Surface::Position => {
+                let [a, b, c] = self.geometry.triangle(hit.prim_id);
+                let point = |i: usize| a[i] + hit.u * (b[i] - a[i]) + hit.v * (c[i] - a[i]);
+                value.copy_from_slice(&[point(0), point(1), point(2)]);
+            }
+        }
+    }
+
+    /// A filter, where any ray of the range may have hits that do not count.
+    fn filter<'a>(&'a self, view: &View<'a>, range: &Range<usize>) -> Option<RayFilter<'a>> {
+        let masks = crate::core::masks_that_refuse(&self.masks, view.masks, range);
+        (masks.is_some() || view.skip.is_some()).then_some(RayFilter {
+            first: range.start,
+            core: self,
+            masks,
+            skip: view.skip,
+        })
+    }
+}
+
+/// Masks of rays and meshes, and a primitive a ray that does not count.
+struct RayFilter<'a> {
+    first: usize,
+    core: &'a DoubleCore,
+    masks: Option<&'a [u32]>,
+    skip: Option<&'a [u32]>,
+}
+
+impl DoubleFilter for RayFilter<'_> {
+    fn accepts(&self, ray: usize, hit: &DoubleHit) -> bool {
+        let (ray, core) = (self.first + ray, self.core);
+        let mesh = || crate::core::mesh(&core.starts, hit.prim_id);
+        self.skip.is_none_or(|skip| one(skip, ray) != hit.prim_id)
+            && self.masks.is_none_or(|masks| one(masks, ray) & core.masks[mesh()] != 0)
+    }
+}
