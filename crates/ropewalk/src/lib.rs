@@ -11,6 +11,7 @@ pub mod build;
 pub mod cost;
 pub mod double;
 pub mod geometry;
+pub mod instance;
 pub mod kernel;
 pub mod method;
 pub mod point;
