@@ -58,6 +58,13 @@ class DoubleCore:
         threads: int,
         progress: Callable[[float], object] | None = None,
     ) -> DoubleCore: ...
+    @staticmethod
+    def place(
+        objects: list[DoubleCore],
+        matrices: _F64,
+        masks: list[int],
+        threads: int,
+    ) -> DoubleCore: ...
     def meshes(self) -> tuple[_F64, _U32]: ...
     @property
     def starts(self) -> list[int]: ...

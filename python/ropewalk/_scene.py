@@ -86,7 +86,7 @@ class Scene:
     1.0
     """
 
-    __slots__ = ("__weakref__", "_core", "_report", "_starts")
+    __slots__ = ("__weakref__", "_core", "_placed", "_report", "_starts")
 
     _core: Core | DoubleCore
 
@@ -149,21 +149,90 @@ class Scene:
                     i,
                 ) from None
             checked.append(_mesh(vertices, faces, f"meshes[{i}]."))
-        bits = [_ALL_BITS] * len(checked)
-        if masks is not None:
-            bits = as_masks(masks, "masks").tolist()
-            if not isinstance(bits, list) or len(bits) != len(checked):
-                raise ArgumentError(
-                    f"masks: expected {len(checked)} masks, one a mesh, found {bits}", "masks"
-                )
+        bits = [_ALL_BITS] * len(checked) if masks is None else _mesh_masks(masks, len(checked), "mesh")
         scene = cls.__new__(cls)
         scene._adopt(_build(checked, bits, preset, precision, threads, progress))
         return scene
+
+    @classmethod
+    def from_instances(
+        cls,
+        instances: Iterable[tuple[Scene, ArrayLike | None]],
+        *,
+        masks: ArrayLike | None = None,
+        threads: int = 0,
+    ) -> Scene:
+        """A scene of other scenes, each placed any number of times without copying it.
+
+        Args:
+            instances: pairs of a scene of double precision and an affine transform into the new scene, shape
+                (3, 4) or (4, 4) with the last row (0, 0, 0, 1), or None for where it is. The same scene may
+                occur often; what it holds and its tree are shared.
+            masks: 32 bits an instance; see :meth:`from_meshes`. Masks of meshes within do not count.
+            threads: threads of the build; only a tree over the boxes of the instances is built, so that moving
+                them takes a call of this method alone, and replacing one of the scenes its own build too.
+
+        In hits ``geom_id`` is the instance and ``prim_id`` the face within its scene, all of its meshes counted
+        through. Rays are transformed in float64 and answered as by a scene of double precision; positions and
+        normals are those of the new scene. One level: instances hold no instances.
+
+        Raises:
+            ArgumentError: matrices without an inverse or not finite, scenes of single precision or of
+                instances, more than 2^31 - 1 faces with all instances counted.
+            ArgumentTypeError: what is no pair of scene and matrix.
+
+        >>> import numpy as np, ropewalk
+        >>> triangle = ropewalk.Scene(np.eye(3), [[0, 1, 2]], precision="double")
+        >>> up = np.eye(4)
+        >>> up[2, 3] = 5
+        >>> scene = ropewalk.Scene.from_instances([(triangle, None), (triangle, up)])
+        >>> hits = scene.all_hits([0.2, 0.2, -9], [0, 0, 1])
+        >>> hits.geom_id, hits.t
+        (array([0, 1], dtype=int32), array([ 9.6, 14.6]))
+        """
+        try:
+            pairs = list(instances)
+        except TypeError:
+            raise ArgumentTypeError(
+                f"instances: expected pairs of a scene and a matrix, found {type(instances).__name__}",
+                "instances",
+            ) from None
+        scenes, matrices = [], np.zeros((len(pairs), 3, 4))
+        for i, pair in enumerate(pairs):
+            name = f"instances[{i}]"
+            try:
+                scene, matrix = pair
+            except (TypeError, ValueError):
+                scene, matrix = None, None
+            if not isinstance(scene, Scene):
+                raise ArgumentTypeError(
+                    f"{name}: expected a pair (scene, matrix), found {type(pair).__name__}",
+                    "instances",
+                    i,
+                )
+            if not isinstance(scene._core, DoubleCore):
+                raise ArgumentError(
+                    f"{name}: expected a scene of double precision, found one of single precision; "
+                    f"make it with precision='double'",
+                    "instances",
+                    i,
+                )
+            scenes.append(scene)
+            matrices[i] = _matrix(matrix, name, i)
+        bits = [_ALL_BITS] * len(pairs) if masks is None else _mesh_masks(masks, len(pairs), "instance")
+        cores = [scene._core for scene in scenes]
+        placed = cls.__new__(cls)
+        core = DoubleCore.place(cores, matrices.reshape(-1), bits, _threads(threads))
+        placed._adopt(core)
+        placed._placed = scenes, matrices
+        return placed
 
     def _adopt(self, core: Core | DoubleCore) -> None:
         self._core = core
         self._starts = np.asarray(core.starts, np.int64)
         self._report: Report | None = None
+        # Scenes and matrices that instances were made of.
+        self._placed: tuple[list[Scene], np.ndarray] | None = None
 
     # Queries ----------------------------------------------------------------------------------
 
@@ -528,6 +597,8 @@ class Scene:
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
         """Pickled as its primitives; the same tree is built again."""
         core = self._core
+        if self._placed is not None:
+            return _restore_instances, (type(self), *self._placed, core.masks)
         if isinstance(core, DoubleCore):
             return _restore_double, (type(self), *core.meshes(), core.starts, core.masks, core.preset)
         return _restore, (type(self), *core.state())
@@ -582,6 +653,12 @@ def _restore(
     threads = default_threads()
     scene._adopt(Core.from_state(kinds, ends, numbers, starts, masks, preset, threads))
     return scene
+
+
+def _restore_instances(
+    kind: type[Scene], scenes: list[Scene], matrices: np.ndarray, masks: list[int]
+) -> Scene:
+    return kind.from_instances(zip(scenes, matrices), masks=masks or None)
 
 
 def _restore_double(
@@ -675,6 +752,36 @@ def _mesh(
     """Vertices as given, faces, and what arguments of the mesh are called."""
     given = as_rows(vertices, f"{name}vertices")
     return given, as_faces(faces, f"{name}faces", len(given)), name
+
+
+def _mesh_masks(masks: ArrayLike, count: int, what: str) -> list[int]:
+    bits = as_masks(masks, "masks").tolist()
+    if not isinstance(bits, list) or len(bits) != count:
+        raise ArgumentError(
+            f"masks: expected {count} masks, one {'an' if what[0] == 'i' else 'a'} {what}, found {bits}",
+            "masks",
+        )
+    return bits
+
+
+def _matrix(matrix: ArrayLike | None, name: str, index: int) -> np.ndarray:
+    """Three rows of an affine transform."""
+    if matrix is None:
+        return np.eye(3, 4)
+    array = as_float64(as_array(matrix, f"{name}: matrix"))
+    if array.shape not in ((3, 4), (4, 4)):
+        raise ArgumentError(
+            f"{name}: expected a matrix of shape (3, 4) or (4, 4), found {array.shape}",
+            "instances",
+            index,
+        )
+    if array.shape == (4, 4) and not np.array_equal(array[3], [0, 0, 0, 1]):
+        raise ArgumentError(
+            f"{name}: expected a matrix whose last row is (0, 0, 0, 1), found {tuple(array[3].tolist())}",
+            "instances",
+            index,
+        )
+    return array[:3]
 
 
 def _check_precision(given: np.ndarray, rounded: np.ndarray, name: str) -> None:

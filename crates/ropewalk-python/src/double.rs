@@ -1,4 +1,5 @@
-//! A scene in `f64` with its tree, and the batch queries: what [`Core`](crate::core::Core) is in `f32`.
+//! Scenes in `f64`, of meshes or of instances, and the batch queries: what [`Core`](crate::core::Core) is in
+//! `f32`.
 
 use crate::core::{Watch, blocks, checked, split, total, zeros};
 use crate::error::{self, Failure};
@@ -10,9 +11,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use ropewalk::build::{BuildReport, BuildSettings, Preset};
 use ropewalk::double::{
-    DoubleAllHits, DoubleCaster, DoubleFilter, DoubleGeometry, DoubleHit, DoubleRay, DoubleTree,
+    DoubleAllHits, DoubleCaster, DoubleFilter, DoubleGeometry, DoubleHit, DoubleRay,
+};
+use ropewalk::instance::{
+    Instance, InstanceAllHits, InstanceCaster, InstanceFilter, InstanceHit, InstancedScene, Object,
+    Transform,
 };
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Rays of a task: a megabyte.
@@ -163,12 +169,18 @@ impl View<'_> {
     }
 }
 
-/// Meshes in `f64` and the tree over them. It never changes.
+/// What rays are cast at.
+enum Held {
+    /// Meshes and the tree over them.
+    Meshes(Arc<Object>, Box<BuildReport>),
+    /// Objects in their places, which are numbered as meshes are.
+    Instances(Box<InstancedScene>),
+}
+
+/// Meshes or instances in `f64` and the trees over them. It never changes.
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
 pub struct DoubleCore {
-    geometry: DoubleGeometry,
-    tree: DoubleTree,
-    report: BuildReport,
+    held: Held,
     /// The first primitive of each mesh, and the number of primitives.
     starts: Vec<u32>,
     /// Masks of the meshes.
@@ -234,20 +246,68 @@ impl DoubleCore {
             let geometry = DoubleGeometry::from_triangles(vertices.to_vec(), faces.to_vec())
                 .map_err(Failure::Double)?;
             let watch = Watch { stop: &stop, done: &done };
-            let (tree, report) = geometry.build(&settings, &watch).map_err(Failure::Build)?;
-            Ok((geometry, tree, report))
+            Object::build(geometry, &settings, &watch).map_err(Failure::Build)
         };
-        let (geometry, tree, report) = work::watch(py, threads, &stop, show, job)?
+        let (object, report) = work::watch(py, threads, &stop, show, job)?
             .map_err(|failure: Failure| failure.into_exception(true))?;
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        Ok(DoubleCore { geometry, tree, report, starts, masks, preset })
+        let held = Held::Meshes(Arc::new(object), Box::new(report));
+        Ok(DoubleCore { held, starts, masks, preset })
+    }
+
+    /// Places objects made by [`DoubleCore::build`]: twelve numbers an instance are the rows of its matrix.
+    #[staticmethod]
+    fn place(
+        py: Python<'_>,
+        objects: Vec<PyRef<'_, DoubleCore>>,
+        matrices: PyReadonlyArray1<'_, f64>,
+        masks: Vec<u32>,
+        threads: usize,
+    ) -> PyResult<DoubleCore> {
+        let (rows, _) = matrices.as_slice()?.as_chunks::<12>();
+        if rows.len() != objects.len() || masks.len() != objects.len() {
+            return Err(error::argument("instances", None, "arrays differ in length".into()));
+        }
+        let mut instances = Vec::with_capacity(objects.len());
+        let (mut starts, mut next) = (vec![0], 0u64);
+        for (i, (core, m)) in objects.iter().zip(rows).enumerate() {
+            let refuse = |message: String| {
+                error::argument("instances", Some(i), format!("instances[{i}]: {message}"))
+            };
+            let Held::Meshes(object, _) = &core.held else {
+                return Err(refuse("expected a scene of meshes, found instances".into()));
+            };
+            let row = |r: usize| [m[4 * r], m[4 * r + 1], m[4 * r + 2], m[4 * r + 3]];
+            let transform = Transform::new([row(0), row(1), row(2)])
+                .map_err(|error| refuse(format!("matrix: {error}")))?;
+            next += object.geometry.len() as u64;
+            if next > i32::MAX as u64 {
+                return Err(refuse("more than 2^31 - 1 primitives, all instances counted".into()));
+            }
+            starts.push(next as u32);
+            instances.push(Instance { object: object.clone(), transform });
+        }
+        drop(objects);
+        let stop = AtomicBool::new(false);
+        let job = || InstancedScene::new(instances, usize::from(threads == 1));
+        let scene = work::watch(py, threads, &stop, |_| Ok(()), job)?
+            .map_err(|error| error::argument("instances", None, error.to_string()))?;
+        Ok(DoubleCore {
+            held: Held::Instances(Box::new(scene)),
+            starts,
+            masks,
+            preset: Preset::Balanced,
+        })
     }
 
     /// Vertices and faces, from which [`DoubleCore::build`] makes the same again.
     fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Mesh<'py>> {
-        let (vertices, faces) = (self.geometry.vertices(), self.geometry.faces());
+        let Held::Meshes(object, _) = &self.held else {
+            return Err(error::other("instances have no mesh of their own".into()));
+        };
+        let (vertices, faces) = (object.geometry.vertices(), object.geometry.faces());
         let vertices = PyArray1::from_slice(py, vertices.as_flattened());
         let faces = PyArray1::from_slice(py, faces.as_flattened());
         let rows = |len: usize| [len / 3, 3];
@@ -275,15 +335,39 @@ impl DoubleCore {
     /// Lower and upper corner of the box of everything.
     #[getter]
     fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
-        self.geometry.bounds()
+        match &self.held {
+            Held::Meshes(object, _) => object.geometry.bounds(),
+            Held::Instances(scene) => scene.bounds(),
+        }
     }
 
     /// Figures of the build and of the tree.
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let figures = crate::core::figures(py, &self.report, self.preset, self.masks.len())?;
-        figures.set_item("tree_bytes", self.tree.bytes())?;
-        figures.set_item("geometry_bytes", self.geometry.bytes())?;
-        Ok(figures)
+        let count = self.masks.len();
+        match &self.held {
+            Held::Meshes(object, report) => {
+                let figures = crate::core::figures(py, report, self.preset, count)?;
+                figures.set_item("tree_bytes", object.tree.bytes())?;
+                figures.set_item("geometry_bytes", object.geometry.bytes())?;
+                Ok(figures)
+            }
+            Held::Instances(scene) => {
+                let figures = crate::core::figures(py, scene.report(), self.preset, count)?;
+                let mut objects: Vec<&Arc<Object>> =
+                    scene.instances().iter().map(|placed| &placed.object).collect();
+                let flat = |object: &&Arc<Object>| object.geometry.degenerate_count();
+                let degenerate: usize = objects.iter().map(flat).sum();
+                objects.sort_by_key(|object| Arc::as_ptr(object));
+                objects.dedup_by_key(|object| Arc::as_ptr(object));
+                let tree: usize = objects.iter().map(|object| object.tree.bytes()).sum();
+                let mesh: usize = objects.iter().map(|object| object.geometry.bytes()).sum();
+                figures.set_item("primitives", self.starts.last().copied().unwrap_or(0))?;
+                figures.set_item("degenerate", degenerate)?;
+                figures.set_item("tree_bytes", tree + scene.bytes())?;
+                figures.set_item("geometry_bytes", mesh)?;
+                Ok(figures)
+            }
+        }
     }
 
     /// Parameter, primitive and mesh of the first hit of each ray; infinity, -1 and -1 for a miss.
@@ -303,13 +387,24 @@ impl DoubleCore {
         let trace = |(range, ((t, prim), geom)): (Range<usize>, (TAndPrim<'_>, _))| {
             let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
             let (rays, invalid) = view.rays(range.clone());
-            match self.filter(&view, &range) {
-                Some(filter) => {
-                    self.caster().with_filter(filter).closest_hit_into(&rays, t, prim);
+            match (&self.held, self.filter(&view, &range)) {
+                (Held::Meshes(object, _), filter) => {
+                    match filter {
+                        Some(f) => cast(object).with_filter(f).closest_hit_into(&rays, t, prim),
+                        None => cast(object).closest_hit_into(&rays, t, prim),
+                    }
+                    crate::core::number(&self.starts, prim, geom);
                 }
-                None => self.caster().closest_hit_into(&rays, t, prim),
+                (Held::Instances(scene), filter) => {
+                    let geom: &mut [u32] = bytemuck::cast_slice_mut(geom);
+                    match filter {
+                        Some(f) => {
+                            place(scene).with_filter(f).closest_hit_into(&rays, t, geom, prim)
+                        }
+                        None => place(scene).closest_hit_into(&rays, t, geom, prim),
+                    }
+                }
             }
-            crate::core::number(&self.starts, prim, geom);
             invalid
         };
         let invalid = total(work::for_each(py, threads, tasks, trace)?);
@@ -331,9 +426,15 @@ impl DoubleCore {
         let tasks = blocks(view.count, block).zip(hit.chunks_mut(block)).collect();
         let trace = |(range, hit): (Range<usize>, &mut [bool])| {
             let (rays, invalid) = view.rays(range.clone());
-            match self.filter(&view, &range) {
-                Some(filter) => self.caster().with_filter(filter).occluded_into(&rays, hit),
-                None => self.caster().occluded_into(&rays, hit),
+            match (&self.held, self.filter(&view, &range)) {
+                (Held::Meshes(object, _), Some(f)) => {
+                    cast(object).with_filter(f).occluded_into(&rays, hit);
+                }
+                (Held::Meshes(object, _), None) => cast(object).occluded_into(&rays, hit),
+                (Held::Instances(scene), Some(f)) => {
+                    place(scene).with_filter(f).occluded_into(&rays, hit);
+                }
+                (Held::Instances(scene), None) => place(scene).occluded_into(&rays, hit),
             }
             invalid
         };
@@ -355,9 +456,11 @@ impl DoubleCore {
         let tasks = blocks(view.count, block).zip(counts.chunks_mut(block)).collect();
         let trace = |(range, counts): (Range<usize>, &mut [i32])| {
             let (rays, invalid) = view.rays(range.clone());
-            let found = match self.filter(&view, &range) {
-                Some(filter) => self.caster().with_filter(filter).count_hits(&rays),
-                None => self.caster().count_hits(&rays),
+            let found = match (&self.held, self.filter(&view, &range)) {
+                (Held::Meshes(object, _), Some(f)) => cast(object).with_filter(f).count_hits(&rays),
+                (Held::Meshes(object, _), None) => cast(object).count_hits(&rays),
+                (Held::Instances(scene), Some(f)) => place(scene).with_filter(f).count_hits(&rays),
+                (Held::Instances(scene), None) => place(scene).count_hits(&rays),
             };
             counts.copy_from_slice(bytemuck::cast_slice(&found));
             invalid
@@ -381,13 +484,19 @@ impl DoubleCore {
         let ranges = blocks(n, crate::core::block(n, threads, BLOCK)).collect();
         let trace = |range: Range<usize>| {
             let (rays, invalid) = view.rays(range.clone());
-            let all = match self.filter(&view, &range) {
-                Some(filter) => self.caster().with_filter(filter).first_hits(&rays, k),
-                None => self.caster().first_hits(&rays, k),
+            let all = match (&self.held, self.filter(&view, &range)) {
+                (Held::Meshes(object, _), Some(f)) => {
+                    of_meshes(cast(object).with_filter(f).first_hits(&rays, k))
+                }
+                (Held::Meshes(object, _), None) => of_meshes(cast(object).first_hits(&rays, k)),
+                (Held::Instances(scene), Some(f)) => {
+                    place(scene).with_filter(f).first_hits(&rays, k)
+                }
+                (Held::Instances(scene), None) => place(scene).first_hits(&rays, k),
             };
             (all, invalid)
         };
-        let (parts, invalid): (Vec<DoubleAllHits>, Vec<Invalid>) =
+        let (parts, invalid): (Vec<InstanceAllHits>, Vec<Invalid>) =
             work::for_each(py, threads, ranges, trace)?.into_iter().unzip();
         let invalid = total(invalid);
         let found = parts.iter().map(|part| part.t.len()).sum();
@@ -411,7 +520,10 @@ impl DoubleCore {
             t.copy_from_slice(&part.t);
             let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
             prim.copy_from_slice(&part.prim_id);
-            crate::core::number(&self.starts, prim, geom);
+            match &self.held {
+                Held::Meshes(..) => crate::core::number(&self.starts, prim, geom),
+                Held::Instances(_) => geom.copy_from_slice(bytemuck::cast_slice(&part.instance)),
+            }
         })?;
         let (t, prim, geom) = (t.into_pyarray(py), prim.into_pyarray(py), geom.into_pyarray(py));
         Ok((offsets.into_pyarray(py), t, prim, geom, invalid.count, invalid.first))
@@ -454,11 +566,8 @@ impl DoubleCore {
                 };
                 let ray = ray.map_or(i, |ray| ray[i] as usize);
                 let ray = (ray < view.count).then(|| view.ray(ray).with_range(t[i], t[i]));
-                let hit = ray.and_then(|ray| self.geometry.intersect(prim, &ray));
-                if let Some(hit) = hit {
-                    self.look(surface, &hit, value);
-                }
-                lost += usize::from(hit.is_none());
+                let found = ray.is_some_and(|ray| self.look(surface, prim, geom[i], &ray, value));
+                lost += usize::from(!found);
             }
             lost
         };
@@ -468,20 +577,40 @@ impl DoubleCore {
 }
 
 impl DoubleCore {
-    fn caster(&self) -> DoubleCaster<'_> {
-        DoubleCaster::new(&self.tree, &self.geometry).with_threads(1)
-    }
-
-    fn look(&self, surface: Surface, hit: &DoubleHit, value: &mut [f64]) {
+    /// Writes what is asked about the hit of a ray whose range holds its parameter alone; false if the ray does
+    /// not hit the primitive there.
+    fn look(
+        &self,
+        surface: Surface,
+        prim: u32,
+        geom: i32,
+        ray: &DoubleRay,
+        value: &mut [f64],
+    ) -> bool {
+        let (object, transform, prim, ray) = match &self.held {
+            Held::Meshes(object, _) => (object, None, prim, *ray),
+            Held::Instances(scene) => {
+                let geom = geom as usize;
+                let placed = &scene.instances()[geom];
+                let ray = placed.transform.ray_to_object(ray);
+                (&placed.object, Some(&placed.transform), prim - self.starts[geom], ray)
+            }
+        };
+        let Some(hit) = object.geometry.intersect(prim, &ray) else { return false };
         match surface {
             Surface::Coordinates => value.copy_from_slice(&[hit.u, hit.v]),
-            Surface::Normal => value.copy_from_slice(&self.geometry.normal(hit.prim_id)),
+            Surface::Normal => {
+                let n = object.geometry.normal(prim);
+                value.copy_from_slice(&transform.map_or(n, |transform| transform.normal(n)));
+            }
             Surface::Position => {
-                let [a, b, c] = self.geometry.triangle(hit.prim_id);
-                let point = |i: usize| a[i] + hit.u * (b[i] - a[i]) + hit.v * (c[i] - a[i]);
-                value.copy_from_slice(&[point(0), point(1), point(2)]);
+                let [a, b, c] = object.geometry.triangle(prim);
+                let p =
+                    std::array::from_fn(|i| a[i] + hit.u * (b[i] - a[i]) + hit.v * (c[i] - a[i]));
+                value.copy_from_slice(&transform.map_or(p, |transform| transform.point(p)));
             }
         }
+        true
     }
 
     /// A filter, where any ray of the range may have hits that do not count.
@@ -504,11 +633,39 @@ struct RayFilter<'a> {
     skip: Option<&'a [u32]>,
 }
 
+impl RayFilter<'_> {
+    fn accepts_mesh(&self, ray: usize, mesh: usize) -> bool {
+        self.masks.is_none_or(|masks| one(masks, ray) & self.core.masks[mesh] != 0)
+    }
+}
+
 impl DoubleFilter for RayFilter<'_> {
     fn accepts(&self, ray: usize, hit: &DoubleHit) -> bool {
-        let (ray, core) = (self.first + ray, self.core);
-        let mesh = || crate::core::mesh(&core.starts, hit.prim_id);
+        let ray = self.first + ray;
         self.skip.is_none_or(|skip| one(skip, ray) != hit.prim_id)
-            && self.masks.is_none_or(|masks| one(masks, ray) & core.masks[mesh()] != 0)
+            && self.accepts_mesh(ray, crate::core::mesh(&self.core.starts, hit.prim_id))
     }
+}
+
+impl InstanceFilter for RayFilter<'_> {
+    fn accepts(&self, ray: usize, hit: &InstanceHit) -> bool {
+        let prim = self.core.starts[hit.instance as usize] + hit.prim_id;
+        self.skip.is_none_or(|skip| one(skip, self.first + ray) != prim)
+    }
+
+    fn visits(&self, ray: usize, instance: u32) -> bool {
+        self.accepts_mesh(self.first + ray, instance as usize)
+    }
+}
+
+fn of_meshes(DoubleAllHits { offsets, t, prim_id }: DoubleAllHits) -> InstanceAllHits {
+    InstanceAllHits { offsets, t, prim_id, instance: Vec::new() }
+}
+
+fn cast(object: &Object) -> DoubleCaster<'_> {
+    DoubleCaster::new(&object.tree, &object.geometry).with_threads(1)
+}
+
+fn place(scene: &InstancedScene) -> InstanceCaster<'_> {
+    InstanceCaster::new(scene).with_threads(1)
 }

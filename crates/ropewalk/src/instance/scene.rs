@@ -3,6 +3,8 @@
 use super::{Transform, TransformError};
 use crate::build::{BuildError, BuildReport, BuildSettings, Monitor, Preset};
 use crate::double::{DoubleGeometry, DoubleGeometryError, DoubleHit, DoubleRay, DoubleTree};
+use crate::geometry::Geometry;
+use crate::wide::WideTree;
 use std::sync::Arc;
 
 /// Triangles with their tree, to be placed.
@@ -97,6 +99,7 @@ pub struct InstancedScene {
     instances: Vec<Instance>,
     /// Twelve triangles around each instance.
     top: Option<Object>,
+    report: BuildReport,
     /// Rays that start farther away than this visit all instances.
     far: f64,
 }
@@ -164,8 +167,10 @@ impl InstancedScene {
             largest = largest.max(size);
             boxes.push((min, max));
         }
+        let settings = BuildSettings { threads, ..BuildSettings::preset(Preset::Balanced) };
         if instances.is_empty() {
-            return Ok(InstancedScene { instances, top: None, far: 0.0 });
+            let (_, report) = WideTree::build(&Geometry::new(), &settings, &())?;
+            return Ok(InstancedScene { instances, top: None, report, far: 0.0 });
         }
         let (mut vertices, mut faces) = (Vec::new(), Vec::new());
         for (placed, (min, max)) in instances.iter().zip(boxes) {
@@ -186,9 +191,9 @@ impl InstancedScene {
             }
             Err(_) => return Err(InstanceError::TooMany { found, max }),
         };
-        let settings = BuildSettings { threads, ..BuildSettings::preset(Preset::Balanced) };
-        let (top, _) = Object::build(geometry, &settings, &())?;
-        Ok(InstancedScene { instances, top: Some(top), far: FAR * largest })
+        let (top, report) = Object::build(geometry, &settings, &())?;
+        let (top, far) = (Some(top), FAR * largest);
+        Ok(InstancedScene { instances, top, report, far })
     }
 
     /// The instances.
@@ -199,6 +204,11 @@ impl InstancedScene {
     /// Lower and upper corner of the box of everything, a little widened.
     pub fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
         self.top.as_ref().and_then(|top| top.geometry.bounds())
+    }
+
+    /// The build of the top-level tree, whose primitives are twelve triangles an instance.
+    pub fn report(&self) -> &BuildReport {
+        &self.report
     }
 
     /// Bytes of the top-level tree with its boxes and of the instances, objects left out.
