@@ -9,6 +9,7 @@ pub mod aabb;
 pub mod accelerator;
 pub mod build;
 pub mod cost;
+pub mod file;
 pub mod geometry;
 pub mod kernel;
 pub mod method;
