@@ -28,6 +28,7 @@ from ._errors import (
     InvalidRayWarning,
     PrecisionWarning,
 )
+from ._file import Saved
 from ._hits import HitLists, Hits, make_hits, make_lists
 from ._report import Report, plural, report_of, size_of
 from ._ropewalk import Core, Rays, default_threads
@@ -50,7 +51,7 @@ _PRECISION = 2.0**-20
 _ALL_BITS = 0xFFFF_FFFF
 
 
-class Scene:
+class Scene(Saved):
     """Triangles that rays can be cast at. A scene never changes and can be used by many threads.
 
     Args:

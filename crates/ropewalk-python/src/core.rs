@@ -1,17 +1,18 @@
 //! A scene with its tree, and the batch queries.
 
 use crate::error::{self, Failure};
+use crate::figures::Build;
 use crate::rays::{Invalid, Rays, View, one};
 use crate::surface::{self, Surface};
 use crate::{state, work};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use ropewalk::build::{BuildReport, BuildSettings, Monitor, Preset};
+use ropewalk::build::{BuildSettings, Monitor, Preset};
 use ropewalk::kernel::{AllHits, BatchCaster, HitFilter};
 use ropewalk::primitive::Triangle;
 use ropewalk::wide::WideTree;
-use ropewalk::{Geometry, GeometryError, Hit, Ray, Shape, Sides};
+use ropewalk::{Geometry, GeometryError, Hit, Ray, Sides};
 use ropewalk_scene::{FacetPolicy, NffLimits, load_scene};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -35,14 +36,14 @@ const TASKS_PER_THREAD: usize = 4;
 /// A geometry of one or more meshes and the tree over it. It never changes.
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
 pub struct Core {
-    geometry: Geometry,
-    tree: WideTree,
-    report: BuildReport,
+    pub(crate) geometry: Geometry,
+    pub(crate) tree: WideTree,
+    pub(crate) report: Build,
     /// The first primitive of each mesh, and the number of primitives.
-    starts: Vec<u32>,
+    pub(crate) starts: Vec<u32>,
     /// Masks of the meshes.
-    masks: Vec<u32>,
-    preset: Preset,
+    pub(crate) masks: Vec<u32>,
+    pub(crate) preset: Preset,
 }
 
 /// Watches a build for Python.
@@ -204,8 +205,7 @@ impl Core {
         figures.set_item("empty_leaves", stats.empty_leaves)?;
         figures.set_item("max_depth", stats.max_depth)?;
         figures.set_item("tree_bytes", self.tree.bytes())?;
-        let shapes = self.geometry.len() * (size_of::<Shape>() + size_of::<Sides>());
-        figures.set_item("geometry_bytes", shapes)?;
+        figures.set_item("geometry_bytes", self.geometry.bytes())?;
         figures.set_item("predicted_steps", stats.predicted_inner_visits)?;
         figures.set_item("predicted_leaves", stats.predicted_leaf_visits)?;
         figures.set_item("predicted_tests", stats.predicted_intersection_tests)?;
@@ -459,7 +459,7 @@ impl Core {
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        Ok(Core { geometry, tree, report, starts, masks, preset })
+        Ok(Core { geometry, tree, report: report.into(), starts, masks, preset })
     }
 
     /// Rays of a task that asks for first hits.
@@ -496,6 +496,12 @@ impl Core {
             return 0;
         }
         self.starts.partition_point(|&start| start <= prim) - 1
+    }
+
+    /// The mask of a primitive's mesh; all bits for primitives that are not there, which an altered file may
+    /// name.
+    fn mask(&self, prim: u32) -> u32 {
+        self.masks.get(self.mesh(prim)).copied().unwrap_or(!0)
     }
 
     /// Numbers primitives within their meshes; misses become -1.
@@ -557,9 +563,7 @@ impl HitFilter for RayFilter<'_> {
         let ray = self.first + ray;
         let core = self.core;
         self.skip.is_none_or(|skip| one(skip, ray) != hit.prim_id)
-            && self
-                .masks
-                .is_none_or(|masks| one(masks, ray) & core.masks[core.mesh(hit.prim_id)] != 0)
+            && self.masks.is_none_or(|masks| one(masks, ray) & core.mask(hit.prim_id) != 0)
     }
 }
 

@@ -9,6 +9,8 @@
 
 mod core;
 mod error;
+mod figures;
+mod file;
 mod rays;
 mod state;
 mod surface;
@@ -23,6 +25,8 @@ mod _ropewalk {
 
     #[pymodule_export]
     use crate::core::Core;
+    #[pymodule_export]
+    use crate::file::{open, save};
     #[pymodule_export]
     use crate::rays::Rays;
 

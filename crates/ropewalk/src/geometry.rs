@@ -144,6 +144,13 @@ impl Geometry {
         self.stored.is_some()
     }
 
+    /// Bytes of the primitives, without what polygons and patches hold; those of a saved scene lie in its
+    /// file.
+    pub fn bytes(&self) -> usize {
+        let own = size_of_val(&self.shapes[..]) + size_of_val(&self.sides[..]);
+        self.stored.as_ref().map_or(own, |stored| stored.bytes())
+    }
+
     /// Number of primitives, degenerate ones included.
     pub fn len(&self) -> usize {
         self.stored.as_ref().map_or(self.shapes.len(), |stored| stored.len())

@@ -31,6 +31,10 @@ impl StoredTriangles {
         fits.then_some(StoredTriangles { rows, sides, shapes: OnceLock::new() })
     }
 
+    pub fn bytes(&self) -> usize {
+        self.rows.bytes().len() + self.sides.as_ref().map_or(0, |sides| sides.bytes().len())
+    }
+
     pub fn len(&self) -> usize {
         self.rows.bytes().len() / TRIANGLE_BYTES
     }
