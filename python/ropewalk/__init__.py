@@ -18,12 +18,14 @@ from ._errors import (
     InternalError,
     InvalidRayError,
     InvalidRayWarning,
+    OtherGeometryError,
     OutOfMemoryError,
     PrecisionWarning,
     RopewalkError,
     SceneFileError,
     SceneNotFoundError,
     SceneReadError,
+    SceneWriteError,
 )
 from ._hits import HitLists, Hits
 from ._report import Report
@@ -40,6 +42,7 @@ __all__ = [
     "InternalError",
     "InvalidRayError",
     "InvalidRayWarning",
+    "OtherGeometryError",
     "OutOfMemoryError",
     "PrecisionWarning",
     "Report",
@@ -48,6 +51,7 @@ __all__ = [
     "SceneFileError",
     "SceneNotFoundError",
     "SceneReadError",
+    "SceneWriteError",
     "default_threads",
     "load",
     "simd_level",

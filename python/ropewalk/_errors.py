@@ -53,6 +53,14 @@ class SceneReadError(SceneFileError, OSError):
     """The system failed while a scene file was read."""
 
 
+class SceneWriteError(RopewalkError, OSError):
+    """A scene could not be saved; nothing is left behind, and a file that was there is untouched."""
+
+
+class OtherGeometryError(SceneFileError):
+    """A saved scene was built for other geometry than the one given."""
+
+
 class InternalError(RopewalkError, RuntimeError):
     """A defect of this package, or threads that the system does not give."""
 

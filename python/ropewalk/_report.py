@@ -51,7 +51,7 @@ class Report:
     predicted_tests: float
     #: Number of leaves by number of references; the last entry holds all larger ones.
     leaf_sizes: list[int]
-    #: Seconds of the build by the clock.
+    #: Seconds of the build by the clock; 0 for a scene that was opened.
     seconds: float
 
     @property
@@ -69,8 +69,11 @@ class Report:
             ("leaves", f"{self.leaves:,}, {self.empty_leaves:,} of them empty"),
             ("depth", str(self.max_depth)),
             ("predicted for a line", f"{self.predicted_steps:.1f} steps, {self.predicted_tests:.1f} tests"),
-            ("build", f"{self.seconds:.3g} s, preset {self.preset}"),
+            ("build", f"{self._build_time()}, preset {self.preset}"),
         ]
+
+    def _build_time(self) -> str:
+        return f"{self.seconds:.3g} s" if self.seconds else "saved"
 
     def __str__(self) -> str:
         rows = self._rows()

@@ -1,4 +1,4 @@
-"""The extension module. Everything in it but the two functions is private to the package."""
+"""The extension module. Everything but `simd_level` and `default_threads` is private to the package."""
 
 from collections.abc import Callable
 from typing import Literal, final
@@ -8,6 +8,14 @@ from numpy.typing import NDArray
 
 def simd_level() -> Literal["scalar", "avx2", "avx512"]: ...
 def default_threads() -> int: ...
+def save(core: Core, path: str) -> int: ...
+def open(
+    path: str,
+    verify: bool,
+    copy: bool,
+    vertices: _F32 | None = None,
+    faces: _U32 | None = None,
+) -> Core: ...
 
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]

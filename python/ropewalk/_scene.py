@@ -30,6 +30,7 @@ from ._errors import (
     InvalidRayWarning,
     PrecisionWarning,
 )
+from ._file import Saved
 from ._hits import HitLists, Hits, make_hits, make_lists
 from ._report import Report, plural, report_of, size_of
 from ._ropewalk import Core, DoubleCore, DoubleRays, Rays, default_threads
@@ -55,7 +56,7 @@ _ALL_BITS = 0xFFFF_FFFF
 _LARGEST = 1e100
 
 
-class Scene:
+class Scene(Saved):
     """Triangles that rays can be cast at. A scene never changes and can be used by many threads.
 
     Args:

@@ -3,7 +3,7 @@
 use crate::interrupt;
 use crate::output::usage;
 use anyhow::Context;
-use ropewalk::build::{self, BuildError, BuildReport, BuildSettings, Termination};
+use ropewalk::build::{self, BuildError, BuildReport, BuildSettings, Preset, Termination};
 use ropewalk::method::Method;
 use ropewalk::wide::WideTree;
 use ropewalk::{Accelerator, Geometry};
@@ -55,18 +55,26 @@ pub struct Engine {
     pub build_seconds: f64,
 }
 
-/// Builds a wide tree; it and the seconds that it took.
+/// The preset called `name`, or a usage error that lists them all.
+pub fn preset(name: &str) -> anyhow::Result<Preset> {
+    Preset::ALL.into_iter().find(|preset| preset.name() == name).ok_or_else(|| {
+        let names = Preset::ALL.map(Preset::name).join(", ");
+        usage(format!("no preset is called '{name}'; there are: {names}"))
+    })
+}
+
+/// Builds a wide tree.
 pub fn build_wide(
     geometry: &Geometry,
     settings: &BuildSettings,
-) -> anyhow::Result<(WideTree, f64)> {
+) -> anyhow::Result<(WideTree, BuildReport)> {
     let bar = interrupt::bar(1000, "build");
     let watch = Watch { cancel: interrupt::flag(), bar: &bar };
     let built = WideTree::build(geometry, settings, &watch);
     bar.finish_and_clear();
     match built {
         Err(BuildError::Cancelled) => Err(interrupt::interrupted()),
-        other => other.map(|(tree, report)| (tree, report.seconds)).map_err(Into::into),
+        other => other.map_err(Into::into),
     }
 }
 

@@ -7,6 +7,7 @@ mod engine;
 mod interrupt;
 mod output;
 mod paper;
+mod saved;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -29,7 +30,11 @@ enum Command {
     Stats(command::stats::Args),
     /// Check every invariant of a scene's tree, ropes and rope trees
     Validate(command::validate::Args),
-    /// Measure rays per second of the batch kernels on a scene
+    /// Build a scene's tree for the batch kernels and save both
+    Build(command::build::Args),
+    /// Check a saved scene and say what it holds
+    Info(command::info::Args),
+    /// Measure rays per second of the batch kernels on a scene, saved or not
     Bench(command::bench::Args),
     /// Run the experiment of the 1997 paper and write its report
     Paper(paper::Args),
@@ -42,6 +47,8 @@ fn main() -> ExitCode {
         Command::Scene(args) => command::scene::run(&args),
         Command::Stats(args) => command::stats::run(&args),
         Command::Validate(args) => command::validate::run(&args),
+        Command::Build(args) => command::build::run(&args),
+        Command::Info(args) => command::info::run(&args),
         Command::Bench(args) => command::bench::run(&args),
         Command::Paper(args) => paper::run(&args),
     };

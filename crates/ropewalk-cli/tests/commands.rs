@@ -244,3 +244,86 @@ fn an_interrupt_leaves_the_last_picture_or_none() {
     assert_eq!(status.code(), Some(1));
     assert!(files(folder.path()).is_empty(), "{:?}", files(folder.path()));
 }
+
+#[test]
+fn a_saved_scene_is_explained_and_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let output = ropewalk(folder.path(), args);
+        assert!(output.status.success(), "{args:?}: {}", stderr(&output));
+        output.stdout
+    };
+    let json = |args: &[&str]| -> Value { serde_json::from_slice(&run(args)).expect("one object") };
+    let file = "balls and more.rope";
+    let built = json(&["build", "spd:balls:2", "--save", file, "--preset", "fast", "--json"]);
+    assert_eq!(files(folder.path()), [file]);
+    has_numbers(&built, "seconds", &["read", "build", "save"]);
+    let info = json(&["info", file, "--verify", "--json"]);
+    assert_eq!(info["primitives"], built["primitives"]);
+    assert_eq!(info["bytes"], built["file_bytes"]);
+    assert_eq!(info["preset"], "fast");
+    has_numbers(&info, "build", &["inner_nodes", "leaves", "references", "depth"]);
+    let names: Vec<_> = info["sections"].as_array().unwrap().iter().map(|s| &s["name"]).collect();
+    assert_eq!(names, ["TREE", "KIND", "ENDS", "NUMS", "stat", "view"]);
+    let text = String::from_utf8(run(&["info", file])).unwrap();
+    assert!(text.contains("a saved scene, ") && text.contains("treelets and blocks"), "{text}");
+
+    // The same rays cost the same as over the scene itself.
+    let bench = |scene: &str, preset: &[&str]| {
+        let args = ["bench", scene, "--side", "32", "--rounds", "1", "--threads", "1", "--json"];
+        json(&[&args, preset].concat())
+    };
+    let (saved, built) = (bench(file, &[]), bench("spd:balls:2", &["--preset", "fast"]));
+    assert_eq!(saved["preset"], "fast");
+    for (saved, built) in [(&saved, &built)].iter().flat_map(|(a, b)| {
+        let of = |json: &Value| json["workloads"].as_array().unwrap().clone();
+        of(a).into_iter().zip(of(b))
+    }) {
+        assert_eq!(saved["rays"], built["rays"]);
+        assert_eq!(saved["per_ray"], built["per_ray"]);
+    }
+    // Saved again with other threads: not a byte differs.
+    let before = std::fs::read(folder.path().join(file)).unwrap();
+    run(&["build", "spd:balls:2", "--save", file, "--preset", "fast", "--threads", "2"]);
+    assert_eq!(std::fs::read(folder.path().join(file)).unwrap(), before);
+}
+
+#[test]
+fn a_file_that_is_no_saved_scene_is_refused_in_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |args: &[&str], code: i32| {
+        let output = ropewalk(folder.path(), args);
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {}", stderr(&output));
+        let sentence = stderr(&output);
+        assert_eq!(sentence.lines().count(), 1, "{sentence}");
+        sentence
+    };
+    assert!(refused(&["info", "no.rope"], 1).contains("cannot open no.rope: "));
+    std::fs::write(folder.path().join("a.nff"), "v\n").unwrap();
+    let sentence = refused(&["info", "a.nff"], 1);
+    assert!(sentence.contains("a.nff: no saved scene: at offset 0, "), "{sentence}");
+    assert!(
+        ropewalk(folder.path(), &["build", "spd:tetra:2", "--save", "a.rope"]).status.success()
+    );
+    let path = folder.path().join("a.rope");
+    let mut bytes = std::fs::read(&path).unwrap();
+    let last = bytes.len() - 64;
+    std::fs::write(&path, &bytes[..last]).unwrap();
+    for command in ["info", "bench"] {
+        assert!(refused(&[command, "a.rope"], 1).contains("the file is cut off: expected "));
+    }
+    let tree = 192 + 64 * 5;
+    bytes[tree + 64] ^= 1;
+    std::fs::write(&path, &bytes).unwrap();
+    let sentence = refused(&["info", "a.rope", "--verify"], 1);
+    assert!(
+        sentence.contains("section TREE, offset ") && sentence.contains("altered"),
+        "{sentence}"
+    );
+    assert!(refused(&["bench", "a.rope", "--preset", "fast"], 2).contains("--preset"));
+    assert!(
+        refused(&["build", "spd:tetra:2", "--save", "b", "--preset", "x"], 2).contains("balanced")
+    );
+    assert!(refused(&["build", "spd:tetra:2", "--save", "no/b"], 1).contains("cannot save no/b: "));
+    assert_eq!(files(folder.path()), ["a.nff", "a.rope"]);
+}

@@ -1,17 +1,18 @@
 //! A scene with its tree, and the batch queries.
 
 use crate::error::{self, Failure};
+use crate::figures::Build;
 use crate::rays::{Invalid, Rays, View, one};
 use crate::surface::{self, Surface};
 use crate::{state, work};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use ropewalk::build::{BuildReport, BuildSettings, Monitor, Preset};
+use ropewalk::build::{BuildSettings, Monitor, Preset};
 use ropewalk::kernel::{AllHits, BatchCaster, HitFilter};
 use ropewalk::primitive::Triangle;
 use ropewalk::wide::WideTree;
-use ropewalk::{Geometry, GeometryError, Hit, Ray, Shape, Sides};
+use ropewalk::{Geometry, GeometryError, Hit, Ray, Sides};
 use ropewalk_scene::{FacetPolicy, NffLimits, load_scene};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -35,14 +36,14 @@ const TASKS_PER_THREAD: usize = 4;
 /// A geometry of one or more meshes and the tree over it. It never changes.
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
 pub struct Core {
-    geometry: Geometry,
-    tree: WideTree,
-    report: BuildReport,
+    pub(crate) geometry: Geometry,
+    pub(crate) tree: WideTree,
+    pub(crate) report: Build,
     /// The first primitive of each mesh, and the number of primitives.
-    starts: Vec<u32>,
+    pub(crate) starts: Vec<u32>,
     /// Masks of the meshes.
-    masks: Vec<u32>,
-    preset: Preset,
+    pub(crate) masks: Vec<u32>,
+    pub(crate) preset: Preset,
 }
 
 /// Watches a build for Python.
@@ -194,8 +195,7 @@ impl Core {
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let figures = figures(py, &self.report, self.preset, self.masks.len())?;
         figures.set_item("tree_bytes", self.tree.bytes())?;
-        let shapes = self.geometry.len() * (size_of::<Shape>() + size_of::<Sides>());
-        figures.set_item("geometry_bytes", shapes)?;
+        figures.set_item("geometry_bytes", self.geometry.bytes())?;
         Ok(figures)
     }
 
@@ -440,7 +440,7 @@ impl Core {
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        Ok(Core { geometry, tree, report, starts, masks, preset })
+        Ok(Core { geometry, tree, report: report.into(), starts, masks, preset })
     }
 
     /// Rays of a task that asks for first hits.
@@ -489,7 +489,9 @@ impl HitFilter for RayFilter<'_> {
         let core = self.core;
         self.skip.is_none_or(|skip| one(skip, ray) != hit.prim_id)
             && self.masks.is_none_or(|masks| {
-                one(masks, ray) & core.masks[mesh(&core.starts, hit.prim_id)] != 0
+                // An altered file may name primitives that are not there.
+                let mesh = core.masks.get(mesh(&core.starts, hit.prim_id));
+                one(masks, ray) & mesh.copied().unwrap_or(!0) != 0
             })
     }
 }
@@ -506,7 +508,7 @@ pub fn preset(name: &str) -> PyResult<Preset> {
 /// Figures of a build, those of its bytes left to the caller.
 pub fn figures<'py>(
     py: Python<'py>,
-    report: &BuildReport,
+    report: &Build,
     preset: Preset,
     meshes: usize,
 ) -> PyResult<Bound<'py, PyDict>> {

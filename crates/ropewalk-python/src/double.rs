@@ -3,13 +3,14 @@
 
 use crate::core::{Watch, blocks, checked, split, total, zeros};
 use crate::error::{self, Failure};
+use crate::figures::Build;
 use crate::rays::{Invalid, one};
 use crate::surface::Surface;
 use crate::work;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use ropewalk::build::{BuildReport, BuildSettings, Preset};
+use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::double::{
     DoubleAllHits, DoubleCaster, DoubleFilter, DoubleGeometry, DoubleHit, DoubleRay,
 };
@@ -172,7 +173,7 @@ impl View<'_> {
 /// What rays are cast at.
 enum Held {
     /// Meshes and the tree over them.
-    Meshes(Arc<Object>, Box<BuildReport>),
+    Meshes(Arc<Object>, Build),
     /// Objects in their places, which are numbered as meshes are.
     Instances(Box<InstancedScene>),
 }
@@ -253,7 +254,7 @@ impl DoubleCore {
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        let held = Held::Meshes(Arc::new(object), Box::new(report));
+        let held = Held::Meshes(Arc::new(object), report.into());
         Ok(DoubleCore { held, starts, masks, preset })
     }
 
@@ -352,7 +353,8 @@ impl DoubleCore {
                 Ok(figures)
             }
             Held::Instances(scene) => {
-                let figures = crate::core::figures(py, scene.report(), self.preset, count)?;
+                let figures =
+                    crate::core::figures(py, &scene.report().clone().into(), self.preset, count)?;
                 let mut objects: Vec<&Arc<Object>> =
                     scene.instances().iter().map(|placed| &placed.object).collect();
                 let flat = |object: &&Arc<Object>| object.geometry.degenerate_count();

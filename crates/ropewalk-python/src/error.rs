@@ -29,6 +29,16 @@ pub fn other(message: String) -> PyErr {
     raise("InternalError", message, None, None)
 }
 
+/// A file is not what it should be, or cannot be had; `class` says which.
+pub fn file(class: &str, message: String) -> PyErr {
+    raise(class, message, Some("path"), None)
+}
+
+/// A scene could not be saved.
+pub fn not_saved(message: String) -> PyErr {
+    raise("SceneWriteError", message, Some("path"), None)
+}
+
 /// There is not enough memory.
 pub fn memory(message: String) -> PyErr {
     raise("OutOfMemoryError", message, None, None)

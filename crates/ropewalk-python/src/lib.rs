@@ -10,6 +10,8 @@
 mod core;
 mod double;
 mod error;
+mod figures;
+mod file;
 mod rays;
 mod state;
 mod surface;
@@ -26,6 +28,8 @@ mod _ropewalk {
     use crate::core::Core;
     #[pymodule_export]
     use crate::double::{DoubleCore, DoubleRays};
+    #[pymodule_export]
+    use crate::file::{open, save};
     #[pymodule_export]
     use crate::rays::Rays;
 

@@ -1,8 +1,7 @@
 //! What is known of a hit beyond its parameter, worked out when it is asked for.
 
-use ropewalk::primitive::Primitive;
 use ropewalk::ray::PreparedRay;
-use ropewalk::{Geometry, Ray, Shape};
+use ropewalk::{Geometry, Ray};
 
 /// What is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,19 +43,18 @@ pub fn look(
     let hit = PreparedRay::new(ray).and_then(|ray| geometry.intersect(prim, &ray));
     let Some(hit) = hit else { return false };
     let write = |value: &mut [f32], p: [f64; 3]| value.copy_from_slice(&p.map(|x| x as f32));
-    match (surface, geometry.shape(prim)) {
-        (Surface::Coordinates, _) => value.copy_from_slice(&[hit.u, hit.v]),
-        (Surface::Normal, shape) => {
-            let crossing = ropewalk::primitive::Crossing { t: hit.t, u: hit.u, v: hit.v };
-            write(value, shape.normals(ray.at(hit.t), crossing).geometric);
-        }
-        (Surface::Position, Shape::Triangle(triangle)) => {
-            let [a, b, c] = triangle.vertices.map(|p| p.map(f64::from));
-            let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-            let point = |i| a[i] + u * (b[i] - a[i]) + v * (c[i] - a[i]);
-            write(value, std::array::from_fn(point));
-        }
-        (Surface::Position, _) => write(value, ray.at(hit.t)),
+    match surface {
+        Surface::Coordinates => value.copy_from_slice(&[hit.u, hit.v]),
+        Surface::Normal => write(value, geometry.normals(ray, &hit).geometric),
+        Surface::Position => match geometry.triangle(prim) {
+            Some(triangle) => {
+                let [a, b, c] = triangle.vertices.map(|p| p.map(f64::from));
+                let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+                let point = |i| a[i] + u * (b[i] - a[i]) + v * (c[i] - a[i]);
+                write(value, std::array::from_fn(point));
+            }
+            None => write(value, ray.at(hit.t)),
+        },
     }
     true
 }

@@ -1,8 +1,13 @@
 //! The set of primitives that a tree is built over.
 
+mod stored;
+
+pub(crate) use stored::{BACK, FRONT, StoredTriangles, TRIANGLE_BYTES};
+
 use crate::aabb::Aabb;
 use crate::primitive::{Crossing, Primitive, Shape, ShapeError, Sides, SurfaceNormals, Triangle};
 use crate::ray::{Hit, PreparedRay, Ray};
+use std::sync::Arc;
 
 /// Why a primitive was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -59,6 +64,8 @@ pub enum GeometryError {
 pub struct Geometry {
     shapes: Vec<Shape>,
     sides: Vec<Sides>,
+    /// The triangles of a saved scene; then there is nothing in `shapes` and `sides`.
+    stored: Option<Arc<StoredTriangles>>,
     bounds: Option<Aabb>,
     degenerate: usize,
 }
@@ -106,6 +113,10 @@ impl Geometry {
     /// [`GeometryError`] if the shape holds a bad value, its box is not finite or there are too
     /// many primitives.
     pub fn push(&mut self, shape: impl Into<Shape>, sides: Sides) -> Result<u32, GeometryError> {
+        if let Some(stored) = self.stored.take() {
+            self.shapes = stored.shapes().to_vec();
+            self.sides = (0..stored.len()).map(|i| stored.sides(i)).collect();
+        }
         let (shape, index) = (shape.into(), self.shapes.len());
         if index >= Self::MAX_PRIMITIVES {
             return Err(GeometryError::TooMany { max: Self::MAX_PRIMITIVES });
@@ -122,14 +133,32 @@ impl Geometry {
         Ok(index as u32)
     }
 
+    /// The triangles of a saved scene, which are used where they lie.
+    pub(crate) fn of_stored(stored: StoredTriangles, bounds: Aabb, degenerate: usize) -> Geometry {
+        let bounds = (stored.len() > 0).then_some(bounds);
+        Geometry { stored: Some(Arc::new(stored)), bounds, degenerate, ..Geometry::new() }
+    }
+
+    /// True if the primitives lie in the file of a saved scene.
+    pub fn is_shared(&self) -> bool {
+        self.stored.is_some()
+    }
+
+    /// Bytes of the primitives, without what polygons and patches hold; those of a saved scene lie in its
+    /// file.
+    pub fn bytes(&self) -> usize {
+        let own = size_of_val(&self.shapes[..]) + size_of_val(&self.sides[..]);
+        self.stored.as_ref().map_or(own, |stored| stored.bytes())
+    }
+
     /// Number of primitives, degenerate ones included.
     pub fn len(&self) -> usize {
-        self.shapes.len()
+        self.stored.as_ref().map_or(self.shapes.len(), |stored| stored.len())
     }
 
     /// True if there is no primitive.
     pub fn is_empty(&self) -> bool {
-        self.shapes.is_empty()
+        self.len() == 0
     }
 
     /// How many primitives have no area; they are kept and never hit.
@@ -142,30 +171,61 @@ impl Geometry {
         self.bounds.unwrap_or(Aabb::EMPTY)
     }
 
-    /// The shape of a primitive.
+    /// The shape of a primitive. If the primitives lie in a file, the first call makes shapes of all of
+    /// them, some 50 bytes each; [`Geometry::triangle`] does not.
     ///
     /// # Panics
     /// If `prim_id` is out of range.
     pub fn shape(&self, prim_id: u32) -> &Shape {
-        &self.shapes[prim_id as usize]
+        let stored = self.stored.as_ref();
+        let shapes = stored.map_or(&self.shapes[..], |stored| stored.shapes());
+        &shapes[prim_id as usize]
+    }
+
+    /// The triangle of a primitive; `None` if it is of another kind or there is none of this number.
+    #[inline]
+    pub fn triangle(&self, prim_id: u32) -> Option<Triangle> {
+        if let Some(stored) = &self.stored {
+            return stored.triangle(prim_id as usize);
+        }
+        match self.shapes.get(prim_id as usize)? {
+            Shape::Triangle(triangle) => Some(*triangle),
+            _ => None,
+        }
     }
 
     /// The sides on which a primitive can be hit.
+    ///
+    /// # Panics
+    /// If `prim_id` is out of range.
     pub fn sides(&self, prim_id: u32) -> Sides {
-        self.sides[prim_id as usize]
+        let i = prim_id as usize;
+        self.stored.as_ref().map_or_else(|| self.sides[i], |stored| stored.sides(i))
     }
 
-    /// Tests one primitive: the first crossing in the ray's range.
+    /// Tests one primitive: the first crossing in the ray's range. `None` also if there is no primitive of
+    /// this number: an altered file may name it.
     #[inline]
     pub fn intersect(&self, prim_id: u32, ray: &PreparedRay) -> Option<Hit> {
         let i = prim_id as usize;
-        let Crossing { t, u, v } = self.shapes[i].intersect(ray, self.sides[i])?;
+        let crossing = if let Some(stored) = &self.stored {
+            stored.triangle(i)?.intersect(ray, stored.sides(i))?
+        } else {
+            self.shapes.get(i)?.intersect(ray, self.sides[i])?
+        };
+        let Crossing { t, u, v } = crossing;
         Some(Hit { t, prim_id, u, v })
     }
 
     /// The normals at a hit of `ray`.
+    ///
+    /// # Panics
+    /// If there is no primitive of this number.
     pub fn normals(&self, ray: &Ray, hit: &Hit) -> SurfaceNormals {
         let crossing = Crossing { t: hit.t, u: hit.u, v: hit.v };
-        self.shape(hit.prim_id).normals(ray.at(hit.t), crossing)
+        match self.triangle(hit.prim_id) {
+            Some(triangle) => triangle.normals(ray.at(hit.t), crossing),
+            None => self.shape(hit.prim_id).normals(ray.at(hit.t), crossing),
+        }
     }
 }

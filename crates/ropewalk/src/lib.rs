@@ -10,6 +10,7 @@ pub mod accelerator;
 pub mod build;
 pub mod cost;
 pub mod double;
+pub mod file;
 pub mod geometry;
 pub mod instance;
 pub mod kernel;

@@ -2,20 +2,21 @@
 
 use crate::output::{print_json, thousands, usage};
 use crate::paper::statistics::median;
-use crate::{engine, interrupt};
-use ropewalk::Ray;
+use crate::{engine, interrupt, saved};
 use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::kernel::{BatchCaster, BatchEvents, BatchReport, Level};
-use ropewalk_render::default_camera;
+use ropewalk::wide::WideTree;
+use ropewalk::{Geometry, Ray};
 use ropewalk_workload::{BenchHit, FIRST_HITS, Generator, Kind, Question, Sizes, View, Workload};
 use serde::Serialize;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// Arguments of `bench`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .nff or .nff.gz file, or a built-in scene such as spd:balls:4
+    /// A .nff or .nff.gz file, a built-in scene such as spd:balls:4, or a saved scene
     scene: String,
     /// Workloads, comma-separated; an unknown name lists them all
     #[arg(
@@ -24,9 +25,9 @@ pub struct Args {
         default_value = "primary,diffuse,shadow,ao,all-hits,walk-1%"
     )]
     workloads: Vec<String>,
-    /// How to build: fast, balanced, best or compact
-    #[arg(long, default_value = Preset::Balanced.name())]
-    preset: String,
+    /// How to build: fast, balanced, best or compact; balanced if not given. A saved scene is not built
+    #[arg(long)]
+    preset: Option<String>,
     /// Pixels along a side of the picture, a power of two; the other workloads follow its size
     #[arg(long, default_value_t = 512, value_parser = side)]
     side: usize,
@@ -117,29 +118,65 @@ impl PerRay {
     }
 }
 
-/// Builds, casts and prints.
+/// What rays are cast at.
+struct Subject {
+    name: String,
+    preset: &'static str,
+    tree: WideTree,
+    geometry: Arc<Geometry>,
+    view: View,
+    seconds: Seconds,
+}
+
+impl Subject {
+    fn build(args: &Args) -> anyhow::Result<Subject> {
+        let preset = args.preset.as_deref().unwrap_or(Preset::Balanced.name());
+        let preset = engine::preset(preset)?;
+        let loaded = engine::load(&args.scene)?;
+        let settings = BuildSettings { threads: args.threads, ..BuildSettings::preset(preset) };
+        let (tree, report) = engine::build_wide(&loaded.geometry, &settings)?;
+        let view = saved::view_of(&loaded);
+        Ok(Subject {
+            name: loaded.scene.name,
+            preset: preset.name(),
+            tree,
+            geometry: loaded.geometry,
+            view,
+            seconds: Seconds { read: loaded.seconds, build: report.seconds },
+        })
+    }
+
+    fn open(args: &Args) -> anyhow::Result<Subject> {
+        if args.preset.is_some() {
+            return Err(usage("a saved scene is not built; leave --preset out"));
+        }
+        let start = Instant::now();
+        let scene = saved::open(&args.scene, false)?;
+        let seconds = Seconds { read: start.elapsed().as_secs_f64(), build: 0.0 };
+        let view = saved::view_in(&scene);
+        let preset = scene.figures.and_then(|figures| Some(figures.preset?.name()));
+        Ok(Subject {
+            name: args.scene.clone(),
+            preset: preset.unwrap_or("saved"),
+            tree: scene.tree,
+            geometry: Arc::new(scene.geometry),
+            view,
+            seconds,
+        })
+    }
+}
+
+/// Builds or opens, casts and prints.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let kinds = kinds(&args.workloads)?;
-    let preset = named(&Preset::ALL, Preset::name, &args.preset, "preset")?;
     let level = level(args.level.as_deref())?;
-    let loaded = engine::load(&args.scene)?;
-    let geometry = &loaded.geometry;
-    let settings = BuildSettings { threads: args.threads, ..BuildSettings::preset(preset) };
-    let (tree, build_seconds) = engine::build_wide(geometry, &settings)?;
+    let subject =
+        if saved::is_saved(&args.scene) { Subject::open(args)? } else { Subject::build(args)? };
+    let Subject { tree, geometry, view, .. } = &subject;
     // A level that the machine lacks was refused above.
-    let caster = BatchCaster::new(&tree, geometry);
+    let caster = BatchCaster::new(tree, geometry);
     let caster = caster.with_level(level).unwrap_or(caster).with_threads(args.threads.min(1));
 
-    let camera = loaded.scene.camera.unwrap_or_else(|| default_camera(&geometry.bounds()));
-    let single = |v: [f64; 3]| v.map(|x| x as f32);
-    let view = View {
-        eye: single(camera.from),
-        at: single(camera.at),
-        up: single(camera.up),
-        fov_degrees: camera.angle as f32,
-        // The renderer's rule: without a light there is one at the eye.
-        light: single(loaded.scene.lights.first().map_or(camera.from, |light| light.position)),
-    };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(args.threads).build()?;
     let trace = |rays: &[Ray], out: &mut [BenchHit]| {
         let hits = pool.install(|| caster.closest_hit(rays));
@@ -147,7 +184,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             *out = BenchHit { t, prim };
         }
     };
-    let generator = Generator::new(&**geometry, &view, Sizes::of_side(args.side), &trace);
+    let generator = Generator::new(&**geometry, view, Sizes::of_side(args.side), &trace);
     let bar = interrupt::bar(u64::from(args.rounds) * kinds.len() as u64, "bench");
     let mut workloads = Vec::new();
     for kind in kinds {
@@ -157,15 +194,15 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     bar.finish_and_clear();
     let bytes = tree.bytes();
     let output = Output {
-        scene: loaded.scene.name.clone(),
-        preset: preset.name(),
+        scene: subject.name.clone(),
+        preset: subject.preset,
         level: level.name(),
         threads: pool.current_num_threads(),
         rounds: args.rounds,
         primitives: geometry.len(),
         bytes,
         bytes_per_primitive: bytes as f64 / geometry.len().max(1) as f64,
-        seconds: Seconds { read: loaded.seconds, build: build_seconds },
+        seconds: subject.seconds,
         workloads,
     };
     if args.json { print_json(&output) } else { print_text(&output) }

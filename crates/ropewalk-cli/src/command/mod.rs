@@ -1,6 +1,8 @@
 //! One file a subcommand.
 
 pub mod bench;
+pub mod build;
+pub mod info;
 pub mod render;
 pub mod scene;
 pub mod stats;

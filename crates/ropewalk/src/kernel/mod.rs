@@ -24,6 +24,7 @@ mod extreme;
 mod leaf;
 mod level;
 mod list;
+mod memory;
 mod order;
 pub(crate) mod point;
 mod query;
@@ -41,5 +42,16 @@ pub use double::{DoubleAllHits, DoubleBatchHit, DoubleCaster, DoubleFilter};
 pub use events::BatchEvents;
 pub(crate) use events::NoEvents;
 pub use level::Level;
+pub(crate) use memory::Memory;
+pub use memory::SharedBytes;
 pub use query::{HitFilter, Masks, NoFilter, Opacity};
 pub use sorted::Sorting;
+
+/// Asks for the cache line of any address at all, where there is such an instruction.
+#[inline(always)]
+pub(crate) fn prefetch(address: *const u8) {
+    #[cfg(target_arch = "x86_64")]
+    x86::prefetch(address);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = address;
+}

@@ -4,7 +4,7 @@ use super::winding::winding_number;
 use super::{ClosestPoint, Crossing, Side, crossing, flushed, is_near};
 use crate::geometry::Geometry;
 use crate::kernel::point::triangle::nearest_foot;
-use crate::primitive::{Primitive, Shape};
+use crate::primitive::Primitive;
 
 /// Points against all triangles; other primitives and triangles without area are passed over.
 #[derive(Clone, Copy)]
@@ -15,11 +15,11 @@ pub struct PointBruteForce<'a> {
 
 impl<'a> PointBruteForce<'a> {
     /// Triangles that have an area, with their ids.
-    fn triangles(&self) -> impl Iterator<Item = (u32, &'a [[f32; 3]; 3])> + use<'a> {
+    fn triangles(&self) -> impl Iterator<Item = (u32, [[f32; 3]; 3])> + use<'a> {
         let geometry = self.geometry;
-        (0..geometry.len() as u32).filter_map(move |id| match geometry.shape(id) {
-            Shape::Triangle(t) if !t.is_degenerate() => Some((id, &t.vertices)),
-            _ => None,
+        (0..geometry.len() as u32).filter_map(move |id| {
+            let triangle = geometry.triangle(id).filter(|t| !t.is_degenerate())?;
+            Some((id, triangle.vertices))
         })
     }
 
@@ -31,7 +31,7 @@ impl<'a> PointBruteForce<'a> {
         }
         let mut best: Option<(f64, u32)> = None;
         for (id, triangle) in self.triangles() {
-            let distance2 = nearest_foot(point, triangle).distance2;
+            let distance2 = nearest_foot(point, &triangle).distance2;
             if best.is_none_or(|(least, _)| distance2 < least) {
                 best = Some((distance2, id));
             }
@@ -47,7 +47,7 @@ impl<'a> PointBruteForce<'a> {
             return Side::Outside;
         }
         for (_, triangle) in self.triangles() {
-            match crossing(p, triangle) {
+            match crossing(p, &triangle) {
                 Crossing::Passes => {}
                 Crossing::Crosses => crossings += 1,
                 Crossing::Starts => return Side::On,
@@ -67,11 +67,12 @@ impl<'a> PointBruteForce<'a> {
     }
 }
 
-/// The answer for the triangle that was found.
+/// The answer for the triangle that was found. An altered file may name one that is not there; then
+/// there is no point.
 pub fn closest(geometry: &Geometry, point: [f64; 3], distance2: f64, prim_id: u32) -> ClosestPoint {
     let distance = distance2.sqrt();
-    let Shape::Triangle(triangle) = geometry.shape(prim_id) else {
-        unreachable!("only triangles are found")
+    let Some(triangle) = geometry.triangle(prim_id) else {
+        return ClosestPoint { distance, prim_id, point: [f64::NAN; 3] };
     };
     let foot = nearest_foot(point, &triangle.vertices);
     let [a, b, c] = triangle.vertices.map(|v| v.map(f64::from));

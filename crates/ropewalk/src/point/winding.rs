@@ -1,10 +1,7 @@
 //! Solid angles.
 
 /// The sum of the signed solid angles of triangles, seen from a point, over 4 pi.
-pub fn winding_number<'a>(
-    point: [f64; 3],
-    triangles: impl Iterator<Item = &'a [[f32; 3]; 3]>,
-) -> f64 {
+pub fn winding_number(point: [f64; 3], triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> f64 {
     let halves: f64 = triangles.map(|triangle| half_solid_angle(point, triangle)).sum();
     // -0.0 where there is nothing.
     halves / std::f64::consts::TAU + 0.0
@@ -13,7 +10,7 @@ pub fn winding_number<'a>(
 /// Half of the solid angle of a triangle, positive where its back is seen: from inside of a surface
 /// whose front is outside (van Oosterom and Strackee, 1983). 0 from its plane, also from the triangle
 /// itself, so that a point on a closed surface gets the mean of both sides.
-fn half_solid_angle(point: [f64; 3], triangle: &[[f32; 3]; 3]) -> f64 {
+fn half_solid_angle(point: [f64; 3], triangle: [[f32; 3]; 3]) -> f64 {
     let [a, b, c] =
         triangle.map(|v| std::array::from_fn::<f64, 3, _>(|i| f64::from(v[i]) - point[i]));
     let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];

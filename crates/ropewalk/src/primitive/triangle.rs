@@ -103,7 +103,10 @@ impl Triangle {
         let depth = (u * a[2] + v * b[2] + w * c[2]) / det;
         let nearest = a[2].min(b[2]).min(c[2]);
         let farthest = a[2].max(b[2]).max(c[2]);
-        let t = sz * depth.clamp(nearest, farthest);
+        // Not `clamp`, which panics where an altered file makes these NaN.
+        let depth = if depth < nearest { nearest } else { depth };
+        let depth = if depth > farthest { farthest } else { depth };
+        let t = sz * depth;
         Some(Meeting { t, u: v / det, v: w / det })
     }
 

@@ -4,6 +4,7 @@
 //! visit misses the address translation buffers as well as the caches.
 
 use super::{Block, Treelet};
+use crate::kernel::Memory;
 use memmap2::MmapMut;
 
 /// Bytes of a cache line.
@@ -15,9 +16,10 @@ pub const BLOCK_LINES: usize = size_of::<Block>() / LINE;
 /// From here on huge pages are asked for.
 const HUGE_FROM: usize = 1 << 21;
 
-/// A fixed number of cache lines, zero at first, that hold treelets and blocks.
+/// A fixed number of cache lines that hold treelets and blocks: its own, zero at first, or those of a
+/// saved tree.
 pub struct Lines {
-    map: MmapMut,
+    memory: Memory,
     len: usize,
 }
 
@@ -33,7 +35,20 @@ impl Lines {
             // Without huge pages the tree is slower, not wrong.
             let _ = map.advise(memmap2::Advice::HugePage);
         }
-        Ok(Lines { map, len })
+        Ok(Lines { memory: Memory::of_map(map), len })
+    }
+
+    /// The lines of a saved tree, whose links have been checked; `None` if the bytes are no lines.
+    pub(crate) fn shared(memory: Memory) -> Option<Lines> {
+        let (len, address) = (memory.bytes().len(), memory.as_ptr().addr());
+        let fits = len.is_multiple_of(LINE) && address.is_multiple_of(LINE);
+        fits.then_some(Lines { memory, len: len / LINE })
+    }
+
+    /// True if they are those of a saved tree: links are right, but what the blocks hold may have been
+    /// altered, even to what is no number.
+    pub fn is_shared(&self) -> bool {
+        self.memory.is_shared()
     }
 
     /// True if there are none.
@@ -49,7 +64,7 @@ impl Lines {
     /// The first line; lines are contiguous and aligned.
     #[inline(always)]
     pub fn as_ptr(&self) -> *const u8 {
-        self.map.as_ptr()
+        self.memory.as_ptr()
     }
 
     /// The treelet at a line.
@@ -58,7 +73,7 @@ impl Lines {
     /// If there is no such line.
     #[inline(always)]
     pub fn treelet(&self, line: usize) -> &Treelet {
-        bytemuck::from_bytes(&self.map[line * LINE..][..size_of::<Treelet>()])
+        bytemuck::from_bytes(&self.memory.bytes()[line * LINE..][..size_of::<Treelet>()])
     }
 
     /// The block that begins at a line.
@@ -67,23 +82,23 @@ impl Lines {
     /// If it does not lie inside.
     #[inline(always)]
     pub fn block(&self, line: usize) -> &Block {
-        bytemuck::from_bytes(&self.map[line * LINE..][..size_of::<Block>()])
+        bytemuck::from_bytes(&self.memory.bytes()[line * LINE..][..size_of::<Block>()])
     }
 
     /// Writes a treelet.
     pub fn set_treelet(&mut self, line: usize, treelet: &Treelet) {
-        self.map[line * LINE..][..size_of::<Treelet>()]
+        self.memory.bytes_mut()[line * LINE..][..size_of::<Treelet>()]
             .copy_from_slice(bytemuck::bytes_of(treelet));
     }
 
-    /// All bytes.
+    /// All bytes; those of an empty tree's one line if there are none.
     pub fn bytes(&self) -> &[u8] {
-        &self.map
+        self.memory.bytes()
     }
 
-    /// All bytes, to be written.
+    /// All bytes, to be written; none of a saved tree.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
-        &mut self.map
+        self.memory.bytes_mut()
     }
 }
 

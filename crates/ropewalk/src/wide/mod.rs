@@ -19,6 +19,7 @@ pub use treelet::{
 pub use validate::WideFault;
 
 use crate::aabb::Aabb;
+use crate::file::Header;
 
 /// Largest number of treelets on a path; sizes the stacks of the kernels.
 pub const MAX_WIDE_DEPTH: usize = crate::tree::MAX_DEPTH.div_ceil(LEVELS);
@@ -68,6 +69,30 @@ impl WideTree {
     /// Code of the root: a treelet, a leaf, or 0 for an empty tree.
     pub fn root(&self) -> u32 {
         self.root
+    }
+
+    /// The tree of a file; links and overflow list have been checked.
+    pub(crate) fn of_file(header: &Header, lines: Lines, overflow: Vec<(u32, u32)>) -> WideTree {
+        WideTree {
+            bounds: header.tree_bounds,
+            root: header.root,
+            lines,
+            treelets: header.treelets as usize,
+            blocks: header.blocks as usize,
+            overflow,
+            has_shapes: header.has_shapes,
+        }
+    }
+
+    /// True if the tree lies in a file; see [`Lines::is_shared`].
+    pub fn is_shared(&self) -> bool {
+        self.lines.is_shared()
+    }
+
+    /// The leaves of [`COUNT_OVERFLOW`] blocks or more, by their first lines, in ascending order, and the
+    /// numbers of their blocks.
+    pub(crate) fn overflow(&self) -> &[(u32, u32)] {
+        &self.overflow
     }
 
     /// Treelets and blocks as they lie in memory.

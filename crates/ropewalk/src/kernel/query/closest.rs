@@ -37,7 +37,8 @@ impl<'a> Closest<'a> {
         if slot.best_at != u32::MAX
             && let Some(hit) = exact.hit(slot.ray, slot.best_at)
         {
-            debug_assert!(slot.best_low <= hit.t && hit.t <= slot.limit);
+            let within = slot.best_low <= hit.t && hit.t <= slot.limit;
+            debug_assert!(within || exact.lines.is_shared(), "a clear hit lies in its interval");
             slot.set_best(hit.t, hit.prim_id);
         }
     }
@@ -60,7 +61,7 @@ impl<'a> Closest<'a> {
             for (lane, &(Sheared { ray, .. }, at)) in pending.iter().enumerate() {
                 if open >> lane & 1 == 1 {
                     let hit = exact.hit(ray, at);
-                    debug_assert!(hit.is_some(), "a clear hit is a hit");
+                    debug_assert!(hit.is_some() || exact.lines.is_shared(), "a clear hit is a hit");
                     t[lane] = hit.map_or(f32::INFINITY, |hit| hit.t);
                 }
                 self.t[ray as usize] = t[lane];

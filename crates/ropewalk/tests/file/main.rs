@@ -1,0 +1,8 @@
+//! Saved scenes: what is opened answers as what was saved, and nothing else is let in.
+
+mod altered;
+#[path = "../../../../fuzz/properties/file.rs"]
+mod property;
+mod refused;
+mod round_trip;
+mod scenes;
