@@ -18,6 +18,7 @@ pub mod ray;
 pub mod rope;
 pub mod traverse;
 pub mod tree;
+pub mod walker;
 pub mod wide;
 
 pub use aabb::Aabb;

@@ -6,6 +6,7 @@ use super::beam::{self, Answers, BatchReport, BeamQuery, Walk, beams};
 use super::entry::Path;
 use super::events::{BatchEvents, Events, NoEvents};
 use super::exact::Exact;
+use super::lanes::{Crowd, Lanes};
 use super::leaf::Leaves;
 use super::level::{Level, Root};
 use super::query::{Any, BatchQuery, Closest, Count, Every, Filtered, HitFilter, NoFilter};
@@ -383,8 +384,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
                 return BatchReport { wave_rays, sorted_rays: wave_rays, ..report };
             }
             let width = room.order.len().min(WAVE);
-            let (slots, source) = (&mut room.slots[..width], &mut FromRoot::new(&room.order));
-            self.wave::<Q, _, _, false>(rays, slots, query, source, &mut NoEvents);
+            let (slots, source) = (&mut room.slots[..width], &mut FromRoot::new(rays, &room.order));
+            self.wave::<Q, _, _, false>(slots, query, source, &mut NoEvents);
             BatchReport { wave_rays, ..report }
         })
     }
@@ -482,28 +483,51 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         with_room(|room| {
             let width = rays.len().min(WAVE);
             if let Some(path) = Path::new(self.tree).filter(|_| search) {
-                let (slots, mut source) = (&mut room.slots[..width], FromEntry::new(path));
-                return self.run_source(rays, slots, query, &mut source, events);
+                let (slots, mut source) = (&mut room.slots[..width], FromEntry::new(rays, path));
+                return self.run_source(slots, query, &mut source, events);
             }
             room.order.clear();
             room.order.extend(0..rays.len() as u32);
-            let (slots, mut source) = (&mut room.slots[..width], FromRoot::new(&room.order));
-            self.run_source(rays, slots, query, &mut source, events);
+            let (slots, mut source) = (&mut room.slots[..width], FromRoot::new(rays, &room.order));
+            self.run_source(slots, query, &mut source, events);
         });
     }
 
-    fn run_source<Q: BatchQuery, S: Source, E: Events>(
+    /// All particles of some lanes, until each has come to its end; `query` is that of the lanes.
+    pub(crate) fn run_lanes<Q: BatchQuery, C: Crowd<Q>>(
         &self,
-        rays: &[Ray],
+        width: usize,
+        query: &mut Q,
+        lanes: &mut Lanes<C>,
+    ) {
+        // Particles may cast rays themselves while they are asked, so the slots are taken along.
+        let mut slots = with_room(|room| std::mem::take(&mut room.slots));
+        slots.resize_with(WAVE, Slot::new);
+        self.run_source(&mut slots[..width], query, lanes, &mut NoEvents);
+        with_room(|room| room.slots = slots);
+    }
+
+    /// The tree.
+    pub(crate) fn tree(&self) -> &'a WideTree {
+        self.tree
+    }
+
+    /// See [`BatchCaster::with_threads`].
+    pub(crate) fn threads(&self) -> usize {
+        self.threads
+    }
+
+    fn run_source<Q: BatchQuery, S: Source<Q>, E: Events>(
+        &self,
         slots: &mut [Slot],
         query: &mut Q,
         source: &mut S,
         events: &mut E,
     ) {
         if self.tree.has_shapes() {
-            self.wave::<Q, S, E, true>(rays, slots, query, source, events);
+            self.wave::<Q, S, E, true>(slots, query, source, events);
         } else {
-            self.wave::<Q, S, E, false>(rays, slots, query, source, events);
+            self.wave::<Q, S, E, false>(slots, query, source, events);
         }
     }
 
@@ -531,9 +555,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     }
 
     /// The rays of `source` in the wave.
-    fn wave<Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
+    fn wave<Q: BatchQuery, S: Source<Q>, E: Events, const SHAPES: bool>(
         &self,
-        rays: &[Ray],
         slots: &mut [Slot],
         query: &mut Q,
         source: &mut S,
@@ -544,18 +567,18 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
             // SAFETY: portable code.
             Level::Scalar => unsafe {
                 wave::<super::scalar::Scalar, Q, S, E, SHAPES>(
-                    tree, geometry, rays, slots, query, source, events,
+                    tree, geometry, slots, query, source, events,
                 );
             },
             // SAFETY: `with_level` and `Level::best` give only levels this machine has.
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 => unsafe {
-                wave_avx2::<Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events);
+                wave_avx2::<Q, S, E, SHAPES>(tree, geometry, slots, query, source, events);
             },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => unsafe {
-                wave_avx512::<Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events);
+                wave_avx512::<Q, S, E, SHAPES>(tree, geometry, slots, query, source, events);
             },
             #[cfg(not(target_arch = "x86_64"))]
             _ => unreachable!("only available levels can be chosen"),
@@ -595,8 +618,8 @@ struct Moved<'a, 'c, F> {
 impl<F: HitFilter> Walk for Moved<'_, '_, F> {
     fn walk<Q: BatchQuery>(self, query: &mut Q) {
         let slots = &mut self.slots[..self.rays.len().min(WAVE)];
-        let source = &mut FromRoot::new(self.order);
-        self.caster.wave::<Q, _, _, false>(self.rays, slots, query, source, &mut NoEvents);
+        let source = &mut FromRoot::new(self.rays, self.order);
+        self.caster.wave::<Q, _, _, false>(slots, query, source, &mut NoEvents);
     }
 }
 
@@ -621,19 +644,16 @@ macro_rules! instantiate {
     ($wave:ident, $beams:ident, $single:ident, $level:ty, $features:literal) => {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
-        fn $wave<Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
+        fn $wave<Q: BatchQuery, S: Source<Q>, E: Events, const SHAPES: bool>(
             tree: &WideTree,
             geometry: &Geometry,
-            rays: &[Ray],
             slots: &mut [Slot],
             query: &mut Q,
             source: &mut S,
             events: &mut E,
         ) {
             // SAFETY: this function enables the level's features.
-            unsafe {
-                wave::<$level, Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events)
-            }
+            unsafe { wave::<$level, Q, S, E, SHAPES>(tree, geometry, slots, query, source, events) }
         }
 
         #[cfg(target_arch = "x86_64")]

@@ -8,4 +8,5 @@ mod exact;
 mod parts;
 mod ropes;
 mod scenes;
+mod walker;
 mod wave;

@@ -31,6 +31,12 @@ impl<'a> Closest<'a> {
         Closest { t, prim, pending: [(Sheared::default(), 0); 2 * PENDING], count: 0 }
     }
 
+    /// The answer to a ray, once it is settled.
+    #[inline(always)]
+    pub fn answer(&self, ray: usize) -> (f32, u32) {
+        (self.t[ray], self.prim[ray])
+    }
+
     /// Finds the exact parameter of the best hit so far.
     #[cold]
     fn settle(slot: &mut Slot, exact: &Exact<'_>) {
