@@ -17,12 +17,14 @@ use std::arch::x86_64::*;
 /// The machine must have AVX2 and FMA, and the caller must enable them.
 #[inline(always)]
 unsafe fn segment(ray: &Ray, slack: f32) -> Segment {
-    // SAFETY: the caller vouches for the features; a ray is eight floats, see `load`; the stores
-    // fill the aligned corners and the four floats of the end.
+    // SAFETY: the caller vouches for the features; the stores fill the aligned corners and the four
+    // floats of the end.
     unsafe {
         let sign = _mm_set1_ps(-0.0);
-        let origin = _mm_loadu_ps(ray.origin.as_ptr());
-        let dir = _mm_loadu_ps(std::ptr::from_ref(ray).cast::<f32>().add(3));
+        // By fields, not as four floats in a row: a ray just written would be read back too wide.
+        let (o, d) = (ray.origin, ray.dir);
+        let origin = _mm_setr_ps(o[0], o[1], o[2], d[0]);
+        let dir = _mm_setr_ps(d[0], d[1], d[2], ray.t_min);
         let from = _mm_fmadd_ps(dir, _mm_set1_ps(ray.t_min), origin);
         let to = _mm_fmadd_ps(dir, _mm_set1_ps(ray.t_max), origin);
         let slack = _mm_set1_ps(slack);

@@ -35,6 +35,10 @@ pub trait Crowd<Q: BatchQuery> {
     /// The next segment in a lane, whose particle may be another than before; `None` once there are no
     /// more particles.
     fn advance(&mut self, k: usize, query: &mut Q, before: Before) -> Option<Ray>;
+
+    /// The segment in a lane has been put under way, and others come first.
+    #[inline(always)]
+    fn wait(&mut self, _k: usize) {}
 }
 
 /// How the segments of a batch went.
@@ -76,10 +80,10 @@ pub struct Lanes<C> {
     before: [Before; WAVE],
     /// The way to each lane's particle; none where the tree is a leaf.
     paths: Vec<Path>,
-    /// Segments until it is decided anew whether to search.
-    left: u32,
     searching: bool,
-    /// Segments that the search answered since it was last decided.
+    /// Segments since it was last decided whether to search.
+    tried: u32,
+    /// Of these, segments that the search answered.
     cleared: u32,
     report: WalkReport,
 }
@@ -95,7 +99,7 @@ impl<C> Lanes<C> {
             before: [Before::Nothing; WAVE],
             searching: !paths.is_empty(),
             paths,
-            left: TRIED,
+            tried: 0,
             cleared: 0,
             report: WalkReport::default(),
         }
@@ -106,13 +110,25 @@ impl<C> Lanes<C> {
         (self.crowd, self.report)
     }
 
+    /// Takes note of some segments, of which the search answered `clear`.
+    #[inline(always)]
+    fn note(&mut self, tried: u32, clear: u32) {
+        self.report.segments += u64::from(tried);
+        self.report.searched += u64::from(if self.searching { tried } else { 0 });
+        self.report.clear += u64::from(clear);
+        self.tried += tried;
+        self.cleared += clear;
+        if self.tried >= if self.searching { TRIED } else { ROOTED } {
+            self.decide();
+        }
+    }
+
     /// Decides whether the next segments are searched for.
     #[cold]
     fn decide(&mut self) {
-        let pays = f64::from(self.cleared) >= WORTHWHILE * f64::from(TRIED);
+        let pays = f64::from(self.cleared) >= WORTHWHILE * f64::from(self.tried);
         self.searching = !self.paths.is_empty() && (!self.searching || pays);
-        self.left = if self.searching { TRIED } else { ROOTED };
-        self.cleared = 0;
+        (self.tried, self.cleared) = (0, 0);
     }
 }
 
@@ -133,22 +149,17 @@ impl<Q: BatchQuery, C: Crowd<Q>> Source<Q> for Lanes<C> {
         events: &mut E,
     ) -> Option<(usize, u32)> {
         let mut before = self.before[k];
-        loop {
-            let ray = self.crowd.advance(k, query, before)?;
-            self.report.segments += 1;
-            if self.left == 0 {
-                self.decide();
-            }
-            self.left -= 1;
+        let (mut tried, mut clear) = (0, 0);
+        let next = loop {
+            let Some(ray) = self.crowd.advance(k, query, before) else { break None };
+            tried += 1;
             let mut code = tree.root();
             if self.searching {
-                self.report.searched += 1;
                 // SAFETY: passed on to the caller; the path is that of the tree.
                 match unsafe { self.paths[k].enter::<L, E>(tree, &ray, events) } {
                     Some(entry) => code = entry,
                     None => {
-                        self.report.clear += 1;
-                        self.cleared += 1;
+                        clear += 1;
                         before = Before::Missed;
                         continue;
                     }
@@ -156,7 +167,10 @@ impl<Q: BatchQuery, C: Crowd<Q>> Source<Q> for Lanes<C> {
             }
             self.rays[k] = ray;
             self.before[k] = Before::Answered;
-            return Some((k, code));
-        }
+            self.crowd.wait(k);
+            break Some((k, code));
+        };
+        self.note(tried, clear);
+        next
     }
 }

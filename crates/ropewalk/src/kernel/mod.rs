@@ -43,7 +43,7 @@ pub(crate) use events::NoEvents;
 pub use lanes::WalkReport;
 pub(crate) use lanes::{Before, Crowd, Lanes};
 pub use level::Level;
-pub use particles::{Arrival, Particle};
+pub use particles::{Arrival, Particle, prefetch};
 pub(crate) use query::Crossings;
 pub use query::{HitFilter, Masks, NoFilter, Opacity};
 pub use sorted::Sorting;

@@ -32,6 +32,20 @@ pub trait Particle: Send {
     /// The next segment, `None` at the end of the walk; `before` is what became of the last one, `None`
     /// at first. Not asked again after the end.
     fn next(&mut self, before: Option<Arrival>) -> Option<Ray>;
+
+    /// The segment has been put under way, and other particles come first: a time to ask for memory that
+    /// [`Particle::next`] will read, see [`prefetch`].
+    #[inline(always)]
+    fn wait(&self) {}
+}
+
+/// Asks for the cache line of a value, which will be read soon.
+#[inline(always)]
+pub fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    super::x86::prefetch(std::ptr::from_ref(value).cast());
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
 }
 
 /// Particles that one task of a parallel batch moves.
@@ -70,6 +84,13 @@ impl<P: Particle> Crowd<Closest<'_>> for Particles<'_, P> {
             if let Some(ray) = particle.next(None) {
                 return Some(ray);
             }
+        }
+    }
+
+    #[inline(always)]
+    fn wait(&mut self, k: usize) {
+        if let Some(particle) = self.particles.get(self.of[k]) {
+            particle.wait();
         }
     }
 }

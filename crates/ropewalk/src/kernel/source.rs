@@ -2,10 +2,11 @@
 
 #![allow(unsafe_code)]
 
-use super::entry::Path;
+use super::entry::{Climb, Path};
 use super::events::Events;
 use super::level::Simd;
 use super::query::BatchQuery;
+use crate::point::Cell;
 use crate::ray::Ray;
 use crate::wide::WideTree;
 
@@ -100,6 +101,55 @@ impl<Q: BatchQuery> Source<Q> for FromEntry<'_> {
             self.next += 1;
             // SAFETY: passed on to the caller.
             match unsafe { self.path.enter::<L, E>(tree, ray, events) } {
+                Some(code) => return Some((index, code)),
+                None => query.miss(index),
+            }
+        }
+        None
+    }
+}
+
+/// All rays in order, each from the cell that is given for it.
+pub struct FromCells<'a> {
+    rays: &'a [Ray],
+    /// One a ray; rays beyond its end have none.
+    cells: &'a [Option<Cell>],
+    next: usize,
+    climb: Climb<'a>,
+}
+
+impl<'a> FromCells<'a> {
+    /// From the first ray on; `climb` belongs to the tree.
+    pub fn new(rays: &'a [Ray], cells: &'a [Option<Cell>], climb: Climb<'a>) -> Self {
+        FromCells { rays, cells, next: 0, climb }
+    }
+
+    /// How the rays went.
+    pub fn into_climb(self) -> Climb<'a> {
+        self.climb
+    }
+}
+
+impl<Q: BatchQuery> Source<Q> for FromCells<'_> {
+    #[inline(always)]
+    fn rays(&self) -> &[Ray] {
+        self.rays
+    }
+
+    #[inline(always)]
+    unsafe fn next<L: Simd, E: Events>(
+        &mut self,
+        _k: usize,
+        tree: &WideTree,
+        query: &mut Q,
+        events: &mut E,
+    ) -> Option<(usize, u32)> {
+        while let Some(ray) = self.rays.get(self.next) {
+            let index = self.next;
+            self.next += 1;
+            let cell = self.cells.get(index).copied().flatten();
+            // SAFETY: passed on to the caller.
+            match unsafe { self.climb.enter::<L, E>(tree, ray, cell, events) } {
                 Some(code) => return Some((index, code)),
                 None => query.miss(index),
             }

@@ -3,6 +3,7 @@
 mod beam;
 mod bench;
 mod builders;
+mod cells;
 mod entry;
 mod exact;
 mod parts;
