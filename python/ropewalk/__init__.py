@@ -29,12 +29,14 @@ from ._hits import HitLists, Hits
 from ._report import Report
 from ._ropewalk import default_threads, simd_level
 from ._scene import Scene, load
+from ._walker import Events, Walker
 
 __version__ = _version("ropewalk")
 
 __all__ = [
     "ArgumentError",
     "ArgumentTypeError",
+    "Events",
     "HitLists",
     "Hits",
     "InternalError",
@@ -48,6 +50,7 @@ __all__ = [
     "SceneFileError",
     "SceneNotFoundError",
     "SceneReadError",
+    "Walker",
     "default_threads",
     "load",
     "simd_level",

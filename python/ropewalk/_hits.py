@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._errors import RopewalkError
+from ._ropewalk import cells_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -107,7 +108,23 @@ class Hits(_Surface):
     array([[0.25, 0.5 , 0.  ]], dtype=float32)
     """
 
-    __slots__ = ()
+    __slots__ = ("_cell",)
+
+    @property
+    def cell(self) -> NDArray[np.int64]:
+        """The cells of the scene in which the hits are, for ``start=`` of later queries; -1 for a miss.
+
+        They are hints, good for the scene that was hit: another cell, or one of another scene, changes no
+        answer. Worked out when first asked for; results that were pickled before have -1.
+        """
+        kept: NDArray[np.int64] | None = getattr(self, "_cell", None)
+        if kept is not None:
+            return kept
+        if self._core is None:
+            return np.full(self.t.shape, -1, np.int64)
+        points = self.position.astype(np.float64).reshape(-1)
+        self._cell = cells_of(self._core, points, self._threads).reshape(self.t.shape)
+        return self._cell
 
     @property
     def hit(self) -> NDArray[np.bool_]:

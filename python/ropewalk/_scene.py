@@ -165,6 +165,7 @@ class Scene:
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        start: ArrayLike | Hits | None = None,
         threads: int = 0,
         strict: bool = False,
     ) -> Hits:
@@ -181,6 +182,9 @@ class Scene:
             skip: a primitive that each ray ignores, usually the one that it leaves: ``prim_id`` of a
                 scene of one mesh, a pair ``(prim_id, geom_id)``, or the :class:`Hits` that the rays
                 start at. -1 ignores nothing.
+            start: cells from which the rays may be walked: ``hits.cell`` of the hits that they start at,
+                those hits, or ``walker.cell``. A hint for short rays, used where it pays: it changes no
+                answer, also if it is wrong.
             threads: threads of this call; 0 is one a processor that this process may use.
             strict: refuse rays that can hit nothing, instead of counting them in a warning.
 
@@ -207,7 +211,9 @@ class Scene:
         rays, shape, threads = self._rays(
             origins, directions, t_min, t_max, masks, skip, threads, strict
         )
-        t, prim, geom, invalid, first = self._core.closest_hit(rays, threads)
+        t, prim, geom, invalid, first = self._core.closest_hit(
+            rays, threads, _cells(start, shape)
+        )
         _warn(invalid, first)
         return make_hits(self._core, rays, threads, shape, (t, prim, geom))
 
@@ -220,6 +226,7 @@ class Scene:
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        start: ArrayLike | Hits | None = None,
         threads: int = 0,
         strict: bool = False,
     ) -> NDArray[np.bool_]:
@@ -235,7 +242,7 @@ class Scene:
         rays, shape, threads = self._rays(
             origins, directions, t_min, t_max, masks, skip, threads, strict
         )
-        hit, invalid, first = self._core.occluded(rays, threads)
+        hit, invalid, first = self._core.occluded(rays, threads, _cells(start, shape))
         _warn(invalid, first)
         return hit.reshape(shape)
 
@@ -377,7 +384,7 @@ class Scene:
         if strict and (index := rays.first_invalid()) is not None:
             reason = _why(o, d, t_min, t_max, shape, index)
             raise InvalidRayError(f"ray {index} can hit nothing: {reason}", "rays", index)
-        threads = _threads(threads)
+        threads = check_threads(threads)
         return rays, shape, 1 if count <= _FEW_RAYS else threads
 
     def _skip(self, skip: Any, shape: tuple[int, ...]) -> NDArray[np.int32]:
@@ -537,7 +544,7 @@ def load(
             f"path: expected a path that is valid Unicode, found {path!r} ({error})", "path"
         ) from None
     with _progress(progress) as show:
-        core = Core.load(name, _preset(preset), _threads(threads), show)
+        core = Core.load(name, _preset(preset), check_threads(threads), show)
     scene = Scene.__new__(Scene)
     scene._adopt(core)
     return scene
@@ -567,7 +574,7 @@ def _build(
 ) -> Core:
     with _progress(progress) as show:
         vertices, faces = [mesh[0] for mesh in meshes], [mesh[1] for mesh in meshes]
-        return Core.build(vertices, faces, masks, _preset(preset), _threads(threads), show)
+        return Core.build(vertices, faces, masks, _preset(preset), check_threads(threads), show)
 
 
 def _preset(preset: str) -> str:
@@ -578,7 +585,19 @@ def _preset(preset: str) -> str:
     return preset
 
 
-def _threads(threads: int) -> int:
+def _cells(start: Any, shape: tuple[int, ...]) -> NDArray[np.int64] | None:
+    """Cells to start from: one for all rays or one a ray; numbers of no cell are none."""
+    if start is None:
+        return None
+    cells = as_array(start.cell if isinstance(start, Hits) else start, "start")
+    if cells.dtype.kind == "f" and cells.size:
+        raise ArgumentTypeError(f"start: expected integers, found dtype {cells.dtype}", "start")
+    if cells.dtype == np.uint64:
+        cells = np.minimum(cells, np.uint64(2**63 - 1))
+    return np.ascontiguousarray(per_ray(cells, shape, "start"), np.int64)
+
+
+def check_threads(threads: int) -> int:
     return as_integer(threads, "threads", 0, _MAX_THREADS) or default_threads()
 
 

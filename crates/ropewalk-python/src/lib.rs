@@ -12,6 +12,7 @@ mod error;
 mod rays;
 mod state;
 mod surface;
+mod walker;
 mod work;
 
 use pyo3::prelude::*;
@@ -25,6 +26,8 @@ mod _ropewalk {
     use crate::core::Core;
     #[pymodule_export]
     use crate::rays::Rays;
+    #[pymodule_export]
+    use crate::walker::{cells_of, walk};
 
     /// The SIMD level that queries use on this machine: scalar, avx2 or avx512.
     #[pyfunction]

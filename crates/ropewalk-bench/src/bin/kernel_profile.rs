@@ -79,7 +79,11 @@ fn main() -> anyhow::Result<()> {
             let cells = engines[0].points()?.locate(&origins);
             if from_cells {
                 let up = engines[0].tree().link_up();
-                println!("table of treelets above: {} bytes beside {}", up.bytes(), engines[0].bytes());
+                println!(
+                    "table of treelets above: {} bytes beside {}",
+                    up.bytes(),
+                    engines[0].bytes()
+                );
             }
             let caster = |engine| {
                 let caster = Wave::caster(engine).with_level(level).context("level not available");

@@ -95,6 +95,13 @@ pub const fn path(child: usize) -> [usize; 3] {
 /// # Safety
 /// The methods may only run on a machine with the level's features.
 pub trait Locate: Copy {
+    /// Writes a ray in one piece: written number by number it could not be read back as vectors at once,
+    /// which costs more than all else about a segment in an empty cell.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn put(to: &mut Ray, ray: &Ray);
+
     /// The segment of a ray; its box, which holds the origin too, widened by `slack` on each side.
     ///
     /// # Safety

@@ -17,14 +17,12 @@ use std::arch::x86_64::*;
 /// The machine must have AVX2 and FMA, and the caller must enable them.
 #[inline(always)]
 unsafe fn segment(ray: &Ray, slack: f32) -> Segment {
-    // SAFETY: the caller vouches for the features; the stores fill the aligned corners and the four
-    // floats of the end.
+    // SAFETY: the caller vouches for the features; a ray is eight floats, see `load`; the stores
+    // fill the aligned corners and the four floats of the end.
     unsafe {
         let sign = _mm_set1_ps(-0.0);
-        // By fields, not as four floats in a row: a ray just written would be read back too wide.
-        let (o, d) = (ray.origin, ray.dir);
-        let origin = _mm_setr_ps(o[0], o[1], o[2], d[0]);
-        let dir = _mm_setr_ps(d[0], d[1], d[2], ray.t_min);
+        let origin = _mm_loadu_ps(ray.origin.as_ptr());
+        let dir = _mm_loadu_ps(std::ptr::from_ref(ray).cast::<f32>().add(3));
         let from = _mm_fmadd_ps(dir, _mm_set1_ps(ray.t_min), origin);
         let to = _mm_fmadd_ps(dir, _mm_set1_ps(ray.t_max), origin);
         let slack = _mm_set1_ps(slack);
@@ -35,6 +33,20 @@ unsafe fn segment(ray: &Ray, slack: f32) -> Segment {
         _mm256_store_ps(segment.corners.0.as_mut_ptr(), corners);
         _mm_storeu_ps(segment.end.as_mut_ptr(), to);
         segment
+    }
+}
+
+/// [`Locate::put`].
+///
+/// # Safety
+/// The machine must have AVX2 and FMA, and the caller must enable them.
+#[inline(always)]
+unsafe fn put(to: &mut Ray, ray: &Ray) {
+    let Ray { origin: o, dir: d, t_min, t_max } = *ray;
+    // SAFETY: the caller vouches for the features; a ray is eight floats in this order.
+    unsafe {
+        let row = _mm256_setr_ps(o[0], o[1], o[2], d[0], d[1], d[2], t_min, t_max);
+        _mm256_storeu_ps(std::ptr::from_mut(to).cast(), row);
     }
 }
 
@@ -170,6 +182,12 @@ unsafe fn narrow(cell: &Corners, treelet: &Treelet, child: usize) -> Corners {
 macro_rules! locate {
     ($level:ty) => {
         impl Locate for $level {
+            #[inline(always)]
+            unsafe fn put(to: &mut Ray, ray: &Ray) {
+                // SAFETY: passed on to the caller.
+                unsafe { put(to, ray) }
+            }
+
             #[inline(always)]
             unsafe fn segment(ray: &Ray, slack: f32) -> Segment {
                 // SAFETY: passed on to the caller.

@@ -153,10 +153,12 @@ impl<Q: BatchQuery, C: Crowd<Q>> Source<Q> for Lanes<C> {
         let next = loop {
             let Some(ray) = self.crowd.advance(k, query, before) else { break None };
             tried += 1;
+            // SAFETY: passed on to the caller.
+            unsafe { L::put(&mut self.rays[k], &ray) };
             let mut code = tree.root();
             if self.searching {
                 // SAFETY: passed on to the caller; the path is that of the tree.
-                match unsafe { self.paths[k].enter::<L, E>(tree, &ray, events) } {
+                match unsafe { self.paths[k].enter::<L, E>(tree, &self.rays[k], events) } {
                     Some(entry) => code = entry,
                     None => {
                         clear += 1;
@@ -165,7 +167,6 @@ impl<Q: BatchQuery, C: Crowd<Q>> Source<Q> for Lanes<C> {
                     }
                 }
             }
-            self.rays[k] = ray;
             self.before[k] = Before::Answered;
             self.crowd.wait(k);
             break Some((k, code));

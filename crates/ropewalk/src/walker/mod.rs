@@ -144,6 +144,16 @@ impl<'a> Walker<'a> {
         &self.stopped
     }
 
+    /// The same with particles that were stopped before, as [`Walker::stopped_at`] said: where a walk goes
+    /// on.
+    ///
+    /// # Panics
+    /// If there are not as many as particles.
+    pub fn with_stopped(self, stopped: Vec<u32>) -> Self {
+        assert!(stopped.len() == self.positions.len(), "one entry a particle");
+        Walker { stopped, ..self }
+    }
+
     /// Puts particles elsewhere, as many as there were; none of them is stopped there.
     ///
     /// # Panics
