@@ -31,12 +31,14 @@ from ._hits import HitLists, Hits
 from ._report import Report
 from ._ropewalk import default_threads, simd_level
 from ._scene import Scene, load
+from ._walker import Events, Walker
 
 __version__ = _version("ropewalk")
 
 __all__ = [
     "ArgumentError",
     "ArgumentTypeError",
+    "Events",
     "HitLists",
     "Hits",
     "InternalError",
@@ -52,6 +54,7 @@ __all__ = [
     "SceneNotFoundError",
     "SceneReadError",
     "SceneWriteError",
+    "Walker",
     "default_threads",
     "load",
     "simd_level",

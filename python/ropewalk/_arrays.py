@@ -54,21 +54,6 @@ def as_float64(array: np.ndarray) -> np.ndarray:
     return np.require(array, dtype=np.float64, requirements=("C", "A"))
 
 
-def is_single(array: np.ndarray) -> bool:
-    """True if rounding to float32 changes no finite number; looked at bit by bit, to spare memory."""
-    kind, size = array.dtype.kind, array.dtype.itemsize
-    if (kind == "f" and size <= 4) or (kind in "iu" and size <= 2):
-        return True
-    rows, step = array.reshape(-1) if array.flags.c_contiguous else array, 1 << 16
-    for start in range(0, len(rows), step):
-        part = np.asarray(rows[start : start + step], np.float64)
-        with np.errstate(over="ignore", under="ignore"):
-            same = part.astype(np.float32).astype(np.float64) == part
-        if not (same | ~np.isfinite(part)).all():
-            return False
-    return True
-
-
 def as_points(value: ArrayLike, argument: str) -> np.ndarray:
     """An array of shape (..., 3)."""
     array = as_array(value, argument)

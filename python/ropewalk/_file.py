@@ -40,7 +40,7 @@ class Saved:
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     scene.save(os.path.join(folder, "triangle.rope"))
         """
-        _ropewalk.save(self._core, _path(path))
+        _ropewalk.save(self._single("save"), _path(path))
 
     @classmethod
     def open(

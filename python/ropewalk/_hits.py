@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._errors import RopewalkError
+from ._ropewalk import DoubleCore, cells_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from ._ropewalk import Core, DoubleCore, DoubleRays, Rays
+    from ._ropewalk import Core, DoubleRays, Rays
 
 _SURFACE = ("uv", "normal", "position")
 
@@ -108,7 +109,24 @@ class Hits(_Surface):
     array([[0.25, 0.5 , 0.  ]], dtype=float32)
     """
 
-    __slots__ = ()
+    __slots__ = ("_cell",)
+
+    @property
+    def cell(self) -> NDArray[np.int64]:
+        """The cells of the scene in which the hits are, for ``start=`` of later queries; -1 for a miss.
+
+        They are hints, good for the scene that was hit: another cell, or one of another scene, changes no
+        answer. Worked out when first asked for; results that were pickled before have -1, and those of scenes of
+        double precision.
+        """
+        kept: NDArray[np.int64] | None = getattr(self, "_cell", None)
+        if kept is not None:
+            return kept
+        if self._core is None or isinstance(self._core, DoubleCore):
+            return np.full(self.t.shape, -1, np.int64)
+        points = self.position.astype(np.float64).reshape(-1)
+        self._cell = cells_of(self._core, points, self._threads).reshape(self.t.shape)
+        return self._cell
 
     @property
     def hit(self) -> NDArray[np.bool_]:

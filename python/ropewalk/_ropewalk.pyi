@@ -1,4 +1,4 @@
-"""The extension module. Everything but `simd_level` and `default_threads` is private to the package."""
+"""The extension module. Everything in it but the first two functions is private to the package."""
 
 from collections.abc import Callable
 from typing import Literal, final
@@ -24,6 +24,22 @@ _I64 = NDArray[np.int64]
 _U32 = NDArray[np.uint32]
 _State = tuple[NDArray[np.uint8], NDArray[np.uint64], _F32, list[int], list[int], str]
 
+def cells_of(core: Core, points: NDArray[np.float64], threads: int) -> _I64: ...
+def walk(
+    core: Core,
+    positions: _F32,
+    stopped: _U32,
+    offsets: _I64,
+    directions: _F32,
+    lengths: _F32,
+    stop: bool,
+    threads: int,
+) -> tuple[
+    tuple[_F32, _U32],
+    tuple[_I64, _I32, _F32, _I32, _I32, NDArray[np.bool_]],
+    _I32,
+    int,
+]: ...
 @final
 class Rays:
     def __new__(
@@ -83,8 +99,12 @@ class DoubleCore:
     @property
     def bounds(self) -> tuple[list[float], list[float]] | None: ...
     def report(self) -> dict[str, object]: ...
-    def closest_hit(self, rays: DoubleRays, threads: int) -> tuple[_F64, _I32, _I32, int, int]: ...
-    def occluded(self, rays: DoubleRays, threads: int) -> tuple[NDArray[np.bool_], int, int]: ...
+    def closest_hit(
+        self, rays: DoubleRays, threads: int, _start: _I64 | None = None
+    ) -> tuple[_F64, _I32, _I32, int, int]: ...
+    def occluded(
+        self, rays: DoubleRays, threads: int, _start: _I64 | None = None
+    ) -> tuple[NDArray[np.bool_], int, int]: ...
     def count_hits(self, rays: DoubleRays, threads: int) -> tuple[_I32, int, int]: ...
     def first_hits(
         self, rays: DoubleRays, threads: int, k: int | None = None
@@ -136,8 +156,12 @@ class Core:
     @property
     def bounds(self) -> tuple[list[float], list[float]] | None: ...
     def report(self) -> dict[str, object]: ...
-    def closest_hit(self, rays: Rays, threads: int) -> tuple[_F32, _I32, _I32, int, int]: ...
-    def occluded(self, rays: Rays, threads: int) -> tuple[NDArray[np.bool_], int, int]: ...
+    def closest_hit(
+        self, rays: Rays, threads: int, start: _I64 | None = None
+    ) -> tuple[_F32, _I32, _I32, int, int]: ...
+    def occluded(
+        self, rays: Rays, threads: int, start: _I64 | None = None
+    ) -> tuple[NDArray[np.bool_], int, int]: ...
     def count_hits(self, rays: Rays, threads: int) -> tuple[_I32, int, int]: ...
     def first_hits(
         self, rays: Rays, threads: int, k: int | None = None

@@ -20,7 +20,6 @@ from ._arrays import (
     as_masks,
     as_points,
     as_rows,
-    is_single,
     per_ray,
 )
 from ._errors import (
@@ -66,8 +65,8 @@ class Scene(Saved):
             ``"compact"`` for a small one.
         precision: ``"single"`` rounds vertices and rays to float32. ``"double"`` keeps them in float64, and
             answers are those of brute force in float64, at any distance from the origin, for 1.1 to 2.2
-            times the time of an incoherent ray, more of a coherent one. ``"auto"`` is ``"single"`` if rounding
-            changes no vertex.
+            times the time of an incoherent ray, more of a coherent one. ``"auto"`` is ``"double"`` where
+            rounding would move a vertex by more than 2^-20 of the mesh's diagonal.
         threads: threads of the build; 0 is one a processor that this process may use. The tree is the
             same for any number.
         progress: True for a bar (where tqdm is installed), or a function of the share done.
@@ -223,7 +222,7 @@ class Scene(Saved):
         bits = [_ALL_BITS] * len(pairs) if masks is None else _mesh_masks(masks, len(pairs), "instance")
         cores = [scene._core for scene in scenes]
         placed = cls.__new__(cls)
-        core = DoubleCore.place(cores, matrices.reshape(-1), bits, _threads(threads))
+        core = DoubleCore.place(cores, matrices.reshape(-1), bits, check_threads(threads))
         placed._adopt(core)
         placed._placed = scenes, matrices
         return placed
@@ -234,6 +233,16 @@ class Scene(Saved):
         self._report: Report | None = None
         # Scenes and matrices that instances were made of.
         self._placed: tuple[list[Scene], np.ndarray] | None = None
+
+    def _single(self, what: str) -> Core:
+        """The core of a scene of single precision."""
+        if isinstance(self._core, DoubleCore):
+            raise ArgumentError(
+                f"{what}: expected a scene of single precision, found one of double precision; it can be "
+                f"made with precision='single'",
+                "scene",
+            )
+        return self._core
 
     # Queries ----------------------------------------------------------------------------------
 
@@ -246,6 +255,7 @@ class Scene(Saved):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        start: ArrayLike | Hits | None = None,
         threads: int = 0,
         strict: bool = False,
     ) -> Hits:
@@ -262,6 +272,9 @@ class Scene(Saved):
             skip: a primitive that each ray ignores, usually the one that it leaves: ``prim_id`` of a
                 scene of one mesh, a pair ``(prim_id, geom_id)``, or the :class:`Hits` that the rays
                 start at. -1 ignores nothing.
+            start: cells from which the rays may be walked: ``hits.cell`` of the hits that they start at,
+                those hits, or ``walker.cell``. A hint for short rays, used where it pays: it changes no
+                answer, also if it is wrong.
             threads: threads of this call; 0 is one a processor that this process may use.
             strict: refuse rays that can hit nothing, instead of counting them in a warning.
 
@@ -288,7 +301,9 @@ class Scene(Saved):
         rays, shape, threads = self._rays(
             origins, directions, t_min, t_max, masks, skip, threads, strict
         )
-        t, prim, geom, invalid, first = self._core.closest_hit(rays, threads)
+        t, prim, geom, invalid, first = self._core.closest_hit(
+            rays, threads, _cells(start, shape)
+        )
         _warn(invalid, first)
         return make_hits(self._core, rays, threads, shape, (t, prim, geom))
 
@@ -301,6 +316,7 @@ class Scene(Saved):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        start: ArrayLike | Hits | None = None,
         threads: int = 0,
         strict: bool = False,
     ) -> NDArray[np.bool_]:
@@ -316,7 +332,7 @@ class Scene(Saved):
         rays, shape, threads = self._rays(
             origins, directions, t_min, t_max, masks, skip, threads, strict
         )
-        hit, invalid, first = self._core.occluded(rays, threads)
+        hit, invalid, first = self._core.occluded(rays, threads, _cells(start, shape))
         _warn(invalid, first)
         return hit.reshape(shape)
 
@@ -460,7 +476,7 @@ class Scene(Saved):
         if strict and (index := rays.first_invalid()) is not None:
             reason = _why(o, d, t_min, t_max, shape, index, double)
             raise InvalidRayError(f"ray {index} can hit nothing: {reason}", "rays", index)
-        threads = _threads(threads)
+        threads = check_threads(threads)
         return rays, shape, 1 if count <= _FEW_RAYS else threads
 
     def _skip(self, skip: Any, shape: tuple[int, ...]) -> NDArray[np.int32]:
@@ -542,7 +558,7 @@ class Scene(Saved):
         """``"single"`` or ``"double"``: the floats of vertices, rays and parameters.
 
         >>> import ropewalk
-        >>> ropewalk.Scene([[0, 0, 0], [0.1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).precision
+        >>> ropewalk.Scene([[1e7, 0, 0], [1e7 + 0.1, 0, 0], [1e7, 1, 0]], [[0, 1, 2]]).precision
         'double'
         """
         return "double" if isinstance(self._core, DoubleCore) else "single"
@@ -635,7 +651,7 @@ def load(
             f"path: expected a path that is valid Unicode, found {path!r} ({error})", "path"
         ) from None
     with _progress(progress) as show:
-        core = Core.load(name, _preset(preset), _threads(threads), show)
+        core = Core.load(name, _preset(preset), check_threads(threads), show)
     scene = Scene.__new__(Scene)
     scene._adopt(core)
     return scene
@@ -684,20 +700,25 @@ def _build(
     threads: int,
     progress: bool | Callable[[float], object] | None,
 ) -> Core | DoubleCore:
-    preset, threads = _preset(preset), _threads(threads)
+    preset, threads = _preset(preset), check_threads(threads)
     if precision not in ("auto", "single", "double"):
         raise ArgumentError(
             f"precision: expected 'auto', 'single' or 'double', found {precision!r}", "precision"
         )
+    vertices = [as_float32(mesh[0]) for mesh in meshes]
+    moved = [_moved(mesh[0], rounded) for mesh, rounded in zip(meshes, vertices)]
     if precision == "auto":
-        precision = "single" if all(is_single(mesh[0]) for mesh in meshes) else "double"
+        precision = "double" if any(by > _PRECISION * size for by, size in moved) else "single"
     if precision == "double" and sum(len(mesh[1]) for mesh in meshes) > 0:
         return _build_double(meshes, masks, preset, threads, progress)
-    vertices = []
-    for given, _, name in meshes:
-        vertices.append(as_float32(given))
-        if not is_single(given):
-            _check_precision(given, vertices[-1], name)
+    for (by, size), (_, _, name) in zip(moved, meshes):
+        if _PRECISION * size < by < np.inf:
+            warnings.warn(
+                f"{name}vertices: rounding to float32 moves vertices by up to {by:.3g}, where the "
+                f"diagonal of all is {size:.3g}; leave out precision='single'",
+                PrecisionWarning,
+                stacklevel=4,
+            )
     faces = [mesh[1] for mesh in meshes]
     with _progress(progress) as show:
         return Core.build(vertices, faces, masks, preset, threads, show)
@@ -743,7 +764,19 @@ def _preset(preset: str) -> str:
     return preset
 
 
-def _threads(threads: int) -> int:
+def _cells(start: Any, shape: tuple[int, ...]) -> NDArray[np.int64] | None:
+    """Cells to start from: one for all rays or one a ray; numbers of no cell are none."""
+    if start is None:
+        return None
+    cells = as_array(start.cell if isinstance(start, Hits) else start, "start")
+    if cells.dtype.kind == "f" and cells.size:
+        raise ArgumentTypeError(f"start: expected integers, found dtype {cells.dtype}", "start")
+    if cells.dtype == np.uint64:
+        cells = np.minimum(cells, np.uint64(2**63 - 1))
+    return np.ascontiguousarray(per_ray(cells, shape, "start"), np.int64)
+
+
+def check_threads(threads: int) -> int:
     return as_integer(threads, "threads", 0, _MAX_THREADS) or default_threads()
 
 
@@ -785,23 +818,22 @@ def _matrix(matrix: ArrayLike | None, name: str, index: int) -> np.ndarray:
     return array[:3]
 
 
-def _check_precision(given: np.ndarray, rounded: np.ndarray, name: str) -> None:
-    """Warns where rounding shows beside the size of the mesh; bit by bit, to spare memory."""
-    if not len(given) or not np.isfinite(rounded).all():
-        return
+def _moved(given: np.ndarray, rounded: np.ndarray) -> tuple[float, float]:
+    """By how much rounding moves vertices at most, and the diagonal of all; bit by bit, to spare memory.
+
+    Infinite for numbers beyond float32, 0 where a number is none.
+    """
+    kind, size = given.dtype.kind, given.dtype.itemsize
+    if (kind == "f" and size <= 4) or (kind in "iu" and size <= 2) or not len(given):
+        return 0.0, 0.0
+    if not np.isfinite(rounded).all():
+        return (np.inf if np.isfinite(given).all() else 0.0), 0.0
     span = rounded.max(axis=0).astype(np.float64) - rounded.min(axis=0)
-    diagonal = float(np.linalg.norm(span))
     step, worst = 1 << 16, 0.0
     for start in range(0, len(given), step):
         part = slice(start, start + step)
         worst = max(worst, float(np.abs(given[part] - rounded[part].astype(np.float64)).max()))
-    if worst > _PRECISION * diagonal:
-        warnings.warn(
-            f"{name}vertices: rounding to float32 moves vertices by up to {worst:.3g}, where the "
-            f"diagonal of all is {diagonal:.3g}; leave out precision='single'",
-            PrecisionWarning,
-            stacklevel=4,
-        )
+    return worst, float(np.linalg.norm(span))
 
 
 def _points(

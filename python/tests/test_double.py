@@ -65,11 +65,11 @@ def test_every_query(make, scale, offset):
 
 
 def test_the_choice_is_automatic():
-    vertices, faces = np.eye(3) / 3, [[0, 1, 2]]
+    vertices, faces = np.eye(3) / 3 + 1e6, [[0, 1, 2]]
     assert ropewalk.Scene(vertices, faces).precision == "double"
     assert ropewalk.Scene(vertices.astype(np.float32), faces).precision == "single"
-    assert ropewalk.Scene(np.eye(3), faces).precision == "single"
-    assert ropewalk.Scene(np.eye(3, dtype=int) * (2**24 + 1), faces).precision == "double"
+    assert ropewalk.Scene(np.eye(3) / 3, faces).precision == "single"
+    assert ropewalk.Scene(np.eye(3, dtype=int) + 2**27, faces).precision == "double"
     assert ropewalk.Scene(np.eye(3), faces, precision="double").precision == "double"
     assert ropewalk.Scene(np.eye(3) * 1e39, faces).precision == "double"
     meshes = [(np.eye(3), faces), (vertices, faces)]
@@ -125,10 +125,10 @@ def test_bad_input():
         with pytest.raises(ropewalk.ArgumentError, match=r"vertices\[1\] is .* finite"):
             ropewalk.Scene(vertices, faces, precision="double")
         with pytest.raises(ropewalk.ArgumentError, match=r"meshes\[1\].vertices\[1\] is .* finite"):
-            ropewalk.Scene.from_meshes([(np.eye(3) / 3, faces), (vertices, faces)])
+            ropewalk.Scene.from_meshes([(np.eye(3), faces), (vertices, faces)], precision="double")
     with pytest.raises(ropewalk.ArgumentError, match="precision: expected 'auto'"):
         ropewalk.Scene(np.eye(3), faces, precision="half")
-    scene = ropewalk.Scene(np.eye(3) / 3, faces)
+    scene = ropewalk.Scene(np.eye(3) / 3, faces, precision="double")
     with pytest.warns(ropewalk.InvalidRayWarning, match="1 rays"):
         assert not scene.closest_hit([0, 0, np.nan], [1, 1, 1]).hit
     with pytest.raises(ropewalk.InvalidRayError, match="zero in float64"):
@@ -139,6 +139,6 @@ def test_bad_input():
 
 def test_degenerate_faces_are_judged_in_float64():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0.5, 1e-12, 0]])
-    scene = ropewalk.Scene(vertices, [[0, 1, 2], [0, 1, 3]])
+    scene = ropewalk.Scene(vertices, [[0, 1, 2], [0, 1, 3]], precision="double")
     assert scene.precision == "double" and scene.report.degenerate == 1
     assert scene.closest_hit([0.5, 5e-13, 1], [0, 0, -1]).prim_id == 1

@@ -4,12 +4,14 @@ use crate::error::{self, Failure};
 use crate::figures::Build;
 use crate::rays::{Invalid, Rays, View, one};
 use crate::surface::{self, Surface};
+use crate::walker::cell;
 use crate::{state, work};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use ropewalk::build::{BuildSettings, Monitor, Preset};
 use ropewalk::kernel::{AllHits, BatchCaster, HitFilter};
+use ropewalk::point::Cell;
 use ropewalk::primitive::Triangle;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, GeometryError, Hit, Ray, Sides};
@@ -200,12 +202,15 @@ impl Core {
     }
 
     /// Parameter, primitive and mesh of the first hit of each ray; infinity, -1 and -1 for a miss.
+    #[pyo3(signature = (rays, threads, start=None))]
     fn closest_hit<'py>(
         &self,
         py: Python<'py>,
         rays: &Rays,
         threads: usize,
+        start: Option<PyReadonlyArray1<'_, i64>>,
     ) -> PyResult<Answer<'py>> {
+        let start = start.as_ref().map(|cells| cells.as_slice()).transpose()?;
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;
         let n = view.count;
@@ -215,7 +220,17 @@ impl Core {
         let tasks = blocks(n, block).zip(chunks).collect();
         let trace = |(range, ((t, prim), geom)): (Range<usize>, (TAndPrim<'_>, _))| {
             let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
+            let cells = self.cells(start, &range);
             let invalid = self.block(&view, range, |caster, filter, rays| match filter {
+                _ if !cells.is_empty() => {
+                    let caster = caster.with_cells(&cells);
+                    match filter {
+                        Some(filter) => {
+                            caster.with_filter(filter).closest_hit_into(rays, t, prim);
+                        }
+                        None => drop(caster.closest_hit_into(rays, t, prim)),
+                    }
+                }
                 Some(filter) => drop(caster.with_filter(filter).closest_hit_into(rays, t, prim)),
                 None if rays.len() == 1 => {
                     let hit = caster.closest_hit_one(&rays[0]);
@@ -232,19 +247,32 @@ impl Core {
     }
 
     /// Whether each ray hits anything.
+    #[pyo3(signature = (rays, threads, start=None))]
     fn occluded<'py>(
         &self,
         py: Python<'py>,
         rays: &Rays,
         threads: usize,
+        start: Option<PyReadonlyArray1<'_, i64>>,
     ) -> PyResult<(Bound<'py, PyArray1<bool>>, usize, usize)> {
+        let start = start.as_ref().map(|cells| cells.as_slice()).transpose()?;
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;
         let mut hit = vec![false; checked::<bool>(view.count)?];
         let block = block(view.count, threads, self.block_size());
         let tasks = blocks(view.count, block).zip(hit.chunks_mut(block)).collect();
         let trace = |(range, hit): (Range<usize>, &mut [bool])| {
+            let cells = self.cells(start, &range);
             self.block(&view, range, |caster, filter, rays| match filter {
+                _ if !cells.is_empty() => {
+                    let caster = caster.with_cells(&cells);
+                    match filter {
+                        Some(filter) => {
+                            caster.with_filter(filter).occluded_into(rays, hit);
+                        }
+                        None => drop(caster.occluded_into(rays, hit)),
+                    }
+                }
                 Some(filter) => drop(caster.with_filter(filter).occluded_into(rays, hit)),
                 None if rays.len() == 1 => hit[0] = caster.occluded_one(&rays[0]),
                 None => drop(caster.occluded_into(rays, hit)),
@@ -441,6 +469,29 @@ impl Core {
             progress.call1(py, (1.0,))?;
         }
         Ok(Core { geometry, tree, report: report.into(), starts, masks, preset })
+    }
+
+    /// The geometry.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// The first primitive of each mesh, and the number of primitives.
+    pub fn first_primitives(&self) -> &[u32] {
+        &self.starts
+    }
+
+    /// The tree.
+    pub fn tree(&self) -> &WideTree {
+        &self.tree
+    }
+
+    /// The cells from which the rays of a range start, if any are given: one for all or one a ray.
+    fn cells(&self, start: Option<&[i64]>, range: &Range<usize>) -> Vec<Option<Cell>> {
+        let Some(start) = start else { return Vec::new() };
+        self.tree.link_up();
+        let of = |i: usize| start.get(if start.len() == 1 { 0 } else { i }).copied().and_then(cell);
+        range.clone().map(of).collect()
     }
 
     /// Rays of a task that asks for first hits.

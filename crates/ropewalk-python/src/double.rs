@@ -372,12 +372,15 @@ impl DoubleCore {
         }
     }
 
-    /// Parameter, primitive and mesh of the first hit of each ray; infinity, -1 and -1 for a miss.
+    /// Parameter, primitive and mesh of the first hit of each ray; infinity, -1 and -1 for a miss. Cells to
+    /// start from are of no use here.
+    #[pyo3(signature = (rays, threads, _start=None))]
     fn closest_hit<'py>(
         &self,
         py: Python<'py>,
         rays: &DoubleRays,
         threads: usize,
+        _start: Option<PyReadonlyArray1<'_, i64>>,
     ) -> PyResult<Answer<'py>> {
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;
@@ -414,12 +417,14 @@ impl DoubleCore {
         Ok((t, prim, geom, invalid.count, invalid.first))
     }
 
-    /// Whether each ray hits anything.
+    /// Whether each ray hits anything; see [`DoubleCore::closest_hit`].
+    #[pyo3(signature = (rays, threads, _start=None))]
     fn occluded<'py>(
         &self,
         py: Python<'py>,
         rays: &DoubleRays,
         threads: usize,
+        _start: Option<PyReadonlyArray1<'_, i64>>,
     ) -> PyResult<(Bound<'py, PyArray1<bool>>, usize, usize)> {
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;

@@ -15,6 +15,7 @@ mod file;
 mod rays;
 mod state;
 mod surface;
+mod walker;
 mod work;
 
 use pyo3::prelude::*;
@@ -32,6 +33,8 @@ mod _ropewalk {
     use crate::file::{open, save};
     #[pymodule_export]
     use crate::rays::Rays;
+    #[pymodule_export]
+    use crate::walker::{cells_of, walk};
 
     /// The SIMD level that queries use on this machine: scalar, avx2 or avx512.
     #[pyfunction]

@@ -21,6 +21,7 @@ pub mod ray;
 pub mod rope;
 pub mod traverse;
 pub mod tree;
+pub mod walker;
 pub mod wide;
 
 pub use aabb::Aabb;

@@ -7,7 +7,7 @@ use ropewalk_bench::harness::{
     Answers, Budget, Builder, Engine, Family, Oracle, Record, Row, Testimony, build_rates,
     calibrate, chart, commit, cpu_name, max_wrong_per_million, rates, summary, today, verify,
 };
-use ropewalk_bench::own::{Single, TaB, TaBBuilder, Wave, WaveBuilder};
+use ropewalk_bench::own::{Single, TaB, TaBBuilder, Walker, Wave, WaveBuilder};
 use ropewalk_bench::peer::{
     BvhBuilder, BvhPeer, Call, Embree, EmbreeBuilder, EmbreeEngine, EmbreeScene, ObvhsBuilder,
     ObvhsPeer, ParryBuilder, ParryPeer, Quality,
@@ -278,10 +278,13 @@ fn engines(plan: &Plan, mesh: &Mesh, filters: bool) -> anyhow::Result<Vec<Box<dy
         engines.push(Box::new(TaB::build(mesh, 1)?));
     }
     let wants = |name| plan.wants(name, Family::Own);
-    if wants("ropewalk-wave") || wants("ropewalk-single") {
+    if ["ropewalk-wave", "ropewalk-single", "ropewalk-walker"].iter().any(|name| wants(name)) {
         let wave = Wave::build(mesh, 1)?;
         if wants("ropewalk-single") {
             engines.push(Box::new(Single(wave.clone())));
+        }
+        if wants("ropewalk-walker") {
+            engines.push(Box::new(Walker(wave.clone())));
         }
         if wants("ropewalk-wave") {
             engines.push(Box::new(wave));

@@ -1,7 +1,8 @@
 //! Nanoseconds and counted events per ray of the batch kernels, without peers.
 //!
 //! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START] [PRESETS]`, names separated by commas;
-//! START is `automatic`, `root` or `entry`, or `single` for one call a ray. Rounds of the presets are
+//! START is `automatic`, `root` or `entry`, `cells` for rays that start from the cells of their origins,
+//! `single` for one call a ray, or `walker` for walks with only the next segment known. Rounds of the presets are
 //! interleaved.
 //!
 //! With the environment variable `PLAIN_CLOCK` time is taken from the wall clock, as Valgrind needs it.
@@ -11,9 +12,9 @@ use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::kernel::{AllHits, BatchCaster, Level, Start};
 use ropewalk_bench::answer::BenchHit;
 use ropewalk_bench::harness::{Clock, Engine, Spread};
-use ropewalk_bench::own::Wave;
+use ropewalk_bench::own::{Walker, Wave};
 use ropewalk_bench::scene::Catalog;
-use ropewalk_bench::workload::{Generator, Kind, Question, Sizes};
+use ropewalk_bench::workload::{Generator, Kind, Question, Sizes, Workload};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -32,10 +33,12 @@ fn main() -> anyhow::Result<()> {
         "automatic" => Start::Automatic,
         "root" => Start::Root,
         "entry" => Start::Entry,
-        "single" => Start::Root,
+        "single" | "walker" => Start::Root,
+        "cells" => Start::Entry,
         name => anyhow::bail!("no start {name}"),
     };
-    let single = arguments.get(4).is_some_and(|name| name == "single");
+    let asked = |start: &str| arguments.get(4).is_some_and(|name| name == start);
+    let (single, walker, from_cells) = (asked("single"), asked("walker"), asked("cells"));
     let presets = match list(5) {
         names if names.is_empty() => vec![Preset::Balanced],
         names => names.iter().map(|name| preset(name)).collect::<anyhow::Result<_>>()?,
@@ -70,13 +73,28 @@ fn main() -> anyhow::Result<()> {
         let generator = Generator::new(&scene.mesh, &scene.view, sizes, &trace);
         for name in list(1) {
             let kind = Kind::named(&name).with_context(|| format!("no workload {name}"))?;
-            let rays = generator.workload(kind).rays;
+            let Workload { rays, chains, .. } = generator.workload(kind);
+            let origin = |ray: &ropewalk::Ray| ray.origin.map(f64::from);
+            let origins: Vec<[f64; 3]> = rays.iter().map(origin).collect();
+            let cells = engines[0].points()?.locate(&origins);
+            if from_cells {
+                let up = engines[0].tree().link_up();
+                println!(
+                    "table of treelets above: {} bytes beside {}",
+                    up.bytes(),
+                    engines[0].bytes()
+                );
+            }
             let caster = |engine| {
                 let caster = Wave::caster(engine).with_level(level).context("level not available");
-                caster.map(|c| c.with_start(start))
+                let caster = caster.map(|c| c.with_start(start));
+                if from_cells { caster.map(|c| c.with_cells(&cells)) } else { caster }
             };
             let casters: Vec<_> = engines.iter().map(caster).collect::<anyhow::Result<_>>()?;
-            let times = time(&casters, kind.question(), &rays, rounds, single);
+            let mut times = time(&casters, kind.question(), &rays, rounds, single);
+            if walker {
+                times = engines.iter().map(|e| walk(e, &rays, &chains, rounds)).collect();
+            }
             for ((caster, ns), preset) in casters.iter().zip(times).zip(&presets) {
                 let events = match kind.question() {
                     Question::Occluded => caster.occluded_events(&rays),
@@ -131,6 +149,19 @@ impl Stopwatch {
             Stopwatch::Wall(start) => start.elapsed().as_secs_f64(),
         }
     }
+}
+
+/// The same for walks of which only the next segment is known.
+fn walk(engine: &Wave, rays: &[ropewalk::Ray], chains: &[u32], rounds: usize) -> f64 {
+    let (walker, mut out) = (Walker(engine.clone()), vec![BenchHit::MISS; rays.len()]);
+    let mut samples = Vec::new();
+    for _ in 0..rounds {
+        let clock = Stopwatch::start();
+        let report = walker.follow(rays, chains, &mut out);
+        samples.push(clock.seconds() * 1e9 / rays.len() as f64);
+        std::hint::black_box(report);
+    }
+    Spread::of(&samples).map_or(f64::NAN, |s| s.median)
 }
 
 /// Median nanoseconds of thread CPU time a ray, for each caster.

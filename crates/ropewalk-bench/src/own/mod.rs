@@ -5,7 +5,9 @@
 //! `run_builds` of the binary.
 
 mod ta_b;
+mod walker;
 mod wave;
 
 pub use ta_b::{TaB, TaBBuilder, geometry};
+pub use walker::Walker;
 pub use wave::{Single, Wave, WaveBuilder};

@@ -51,6 +51,11 @@ impl Wave {
         Ok(Wave { geometry: Arc::new(geometry), tree: Arc::new(tree) })
     }
 
+    /// The tree.
+    pub fn tree(&self) -> &WideTree {
+        &self.tree
+    }
+
     /// Bytes of the tree, its own triangles included.
     pub fn bytes(&self) -> usize {
         self.tree.bytes()

@@ -8,7 +8,7 @@
 
 use super::error::{FileError, Part};
 use super::header::Tag;
-use crate::kernel::prefetch;
+use crate::kernel::prefetch_line;
 use crate::wide::{
     BLOCK_LINES, COUNT_OVERFLOW, LEAF, LINE, Lines, MAX_WIDE_DEPTH, Treelet, code_line,
 };
@@ -47,7 +47,7 @@ impl Waiting {
     fn next(&mut self, lines: &Lines) -> Option<Subtree> {
         while self.put - self.taken < AHEAD {
             let Some(subtree) = self.stack.pop() else { break };
-            prefetch(lines.as_ptr().wrapping_add(subtree.line * LINE));
+            prefetch_line(lines.as_ptr().wrapping_add(subtree.line * LINE));
             self.asked[self.put % AHEAD] = subtree;
             self.put += 1;
         }

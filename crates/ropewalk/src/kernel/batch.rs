@@ -3,9 +3,10 @@
 #![allow(unsafe_code)]
 
 use super::beam::{self, Answers, BatchReport, BeamQuery, Walk, beams};
-use super::entry::Path;
+use super::entry::{Climb, Path};
 use super::events::{BatchEvents, Events, NoEvents};
 use super::exact::Exact;
+use super::lanes::{Crowd, Lanes};
 use super::leaf::Leaves;
 use super::level::{Level, Root};
 use super::query::{Any, BatchQuery, Closest, Count, Every, Filtered, HitFilter, NoFilter};
@@ -13,9 +14,11 @@ use super::scalar::Scalar;
 use super::single::{single, with_slot};
 use super::slot::Slot;
 use super::sorted::{GROUP, SMALLEST, Sorter, Sorting};
-use super::source::{FromEntry, FromRoot, Source};
+use super::source::{FromCells, FromEntry, FromRoot, Source};
 use super::wave::{WAVE, wave};
 use crate::geometry::Geometry;
+use crate::point::Cell;
+use crate::point::cells::locate;
 use crate::ray::{Hit, PreparedRay, Ray};
 use crate::wide::WideTree;
 use rayon::prelude::*;
@@ -72,6 +75,17 @@ pub enum Start {
     Entry,
 }
 
+/// Where the rays of a batch start, decided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    /// At the root.
+    Root,
+    /// At their entries, searched for one after the other.
+    Entry,
+    /// At their entries, searched for from the cells given.
+    Cells,
+}
+
 /// Answers batches of rays over a wide tree.
 #[derive(Clone, Copy)]
 pub struct BatchCaster<'a, F = NoFilter> {
@@ -83,6 +97,8 @@ pub struct BatchCaster<'a, F = NoFilter> {
     beams: bool,
     start: Start,
     sorting: Sorting,
+    /// One a ray.
+    cells: Option<&'a [Option<Cell>]>,
     filter: F,
 }
 
@@ -98,6 +114,7 @@ impl<'a> BatchCaster<'a> {
             beams: true,
             start: Start::Automatic,
             sorting: Sorting::Automatic,
+            cells: None,
             filter: NoFilter,
         }
     }
@@ -108,8 +125,9 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// batch and the hit, or [`Masks`](super::Masks) or [`Opacity`](super::Opacity) from arrays. It
     /// runs inside the traversal; see [`HitFilter`] for what it may rely on.
     pub fn with_filter<G: HitFilter>(self, filter: G) -> BatchCaster<'a, G> {
-        let BatchCaster { tree, geometry, root, level, threads, beams, start, sorting, .. } = self;
-        BatchCaster { tree, geometry, root, level, threads, beams, start, sorting, filter }
+        let BatchCaster { tree, geometry, root, level, threads, beams, start, .. } = self;
+        let BatchCaster { sorting, cells, .. } = self;
+        BatchCaster { tree, geometry, root, level, threads, beams, start, sorting, cells, filter }
     }
 
     /// The same with another level, or `None` if this machine lacks it.
@@ -133,14 +151,34 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         BatchCaster { start, ..self }
     }
 
+    /// The same with a cell for each ray of the batch, from which its walk may start: that of its origin,
+    /// say from [`BatchCaster::cells_at`] or [`PointQueries::locate`](crate::point::PointQueries::locate).
+    /// It changes no answer: from a cell that a ray is not near to, or that is none of this tree, a walk
+    /// starts higher up or at the root. Rays beyond the end of `cells` have none.
+    ///
+    /// Cells are used if the tree has its table ([`WideTree::link_up`]) and, unless [`Start::Entry`] is set,
+    /// if a sample of the rays says that it pays.
+    pub fn with_cells(self, cells: &'a [Option<Cell>]) -> Self {
+        BatchCaster { cells: Some(cells), ..self }
+    }
+
+    /// The cells in which rays are at some parameters, as those of their hits; `None` outside of the
+    /// tree's box, and for a miss.
+    ///
+    /// # Panics
+    /// If there are not as many parameters as rays.
+    pub fn cells_at(&self, rays: &[Ray], t: &[f32]) -> Vec<Option<Cell>> {
+        assert!(t.len() == rays.len(), "one entry a ray");
+        let cell = |(ray, t): (&Ray, &f32)| locate(self.tree, ray.at(*t));
+        if self.is_serial(rays) {
+            return rays.iter().zip(t).map(cell).collect();
+        }
+        rays.par_iter().zip(t).with_min_len(TASK).map(cell).collect()
+    }
+
     /// The same with incoherent rays sorted by where they start, or not. The answers are the same.
     pub fn with_sorting(self, sorting: Sorting) -> Self {
         BatchCaster { sorting, ..self }
-    }
-
-    /// See [`BatchCaster::with_threads`].
-    pub(super) fn threads(&self) -> usize {
-        self.threads
     }
 
     /// The level in use.
@@ -348,13 +386,10 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
 
     /// Coherent rays in beams, the others in the wave.
     fn run_coherent<Q: BeamQuery>(&self, rays: &[Ray], first_ray: usize, query: Q) -> BatchReport {
-        let search = self.searches(rays);
-        if search || F::FILTERS || !self.beams || self.tree.has_shapes() {
+        let way = self.way(rays, first_ray);
+        if way != Way::Root || F::FILTERS || !self.beams || self.tree.has_shapes() {
             let mut filtered = Filtered { query, filter: &self.filter, first_ray };
-            self.run_wave(rays, search, &mut filtered, &mut NoEvents);
-            let wave_rays = rays.len() as u64;
-            let entry_rays = if search { wave_rays } else { 0 };
-            return BatchReport { wave_rays, entry_rays, ..BatchReport::default() };
+            return self.run_wave(rays, way, first_ray, &mut filtered, &mut NoEvents);
         }
         let mut query = query;
         with_room(|room| {
@@ -388,8 +423,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
                 return BatchReport { wave_rays, sorted_rays: wave_rays, ..report };
             }
             let width = room.order.len().min(WAVE);
-            let (slots, source) = (&mut room.slots[..width], &mut FromRoot::new(&room.order));
-            self.wave::<Q, _, _, false>(rays, slots, query, source, &mut NoEvents);
+            let (slots, source) = (&mut room.slots[..width], &mut FromRoot::new(rays, &room.order));
+            self.wave::<Q, _, _, false>(slots, query, source, &mut NoEvents);
             BatchReport { wave_rays, ..report }
         })
     }
@@ -419,7 +454,8 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         answer: impl FnOnce(Q) -> T,
     ) -> T {
         let mut filtered = Filtered { query, filter: &self.filter, first_ray };
-        self.run_counted(rays, &mut filtered, &mut NoEvents);
+        let way = self.way(rays, first_ray);
+        self.run_wave(rays, way, first_ray, &mut filtered, &mut NoEvents);
         answer(filtered.query)
     }
 
@@ -473,72 +509,131 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     }
 
     fn run_counted<Q: BatchQuery, E: Events>(&self, rays: &[Ray], query: &mut Q, events: &mut E) {
-        self.run_wave(rays, self.searches(rays), query, events);
+        self.run_wave(rays, self.way(rays, 0), 0, query, events);
     }
 
-    /// All rays in the wave, from the root or from their entries.
+    /// All rays in the wave, the first of which is `first_ray` in the batch.
     pub(super) fn run_wave<Q: BatchQuery, E: Events>(
         &self,
         rays: &[Ray],
-        search: bool,
+        way: Way,
+        first_ray: usize,
         query: &mut Q,
         events: &mut E,
-    ) {
+    ) -> BatchReport {
+        let report = BatchReport { wave_rays: rays.len() as u64, ..BatchReport::default() };
         with_room(|room| {
             let width = rays.len().min(WAVE);
-            if let Some(path) = Path::new(self.tree).filter(|_| search) {
-                let (slots, mut source) = (&mut room.slots[..width], FromEntry::new(path));
-                return self.run_source(rays, slots, query, &mut source, events);
+            let slots = &mut room.slots[..width];
+            if way == Way::Cells
+                && let Some(climb) = Climb::new(self.tree)
+            {
+                let mut source = FromCells::new(rays, self.cells_from(first_ray), climb);
+                self.run_source(slots, query, &mut source, events);
+                let Climb { started, climbed, .. } = source.into_climb();
+                return BatchReport { cell_rays: started, climbed_rays: climbed, ..report };
+            }
+            if way == Way::Entry
+                && let Some(path) = Path::new(self.tree)
+            {
+                let mut source = FromEntry::new(rays, path);
+                self.run_source(slots, query, &mut source, events);
+                return BatchReport { entry_rays: report.wave_rays, ..report };
             }
             room.order.clear();
             room.order.extend(0..rays.len() as u32);
-            let (slots, mut source) = (&mut room.slots[..width], FromRoot::new(&room.order));
-            self.run_source(rays, slots, query, &mut source, events);
-        });
+            let mut source = FromRoot::new(rays, &room.order);
+            self.run_source(slots, query, &mut source, events);
+            report
+        })
     }
 
-    fn run_source<Q: BatchQuery, S: Source, E: Events>(
+    /// The cells of the rays from `first_ray` on.
+    fn cells_from(&self, first_ray: usize) -> &'a [Option<Cell>] {
+        self.cells.and_then(|cells| cells.get(first_ray..)).unwrap_or(&[])
+    }
+
+    /// All particles of some lanes, until each has come to its end; `query` is that of the lanes.
+    pub(crate) fn run_lanes<Q: BatchQuery, C: Crowd<Q>>(
         &self,
-        rays: &[Ray],
+        width: usize,
+        query: &mut Q,
+        lanes: &mut Lanes<C>,
+    ) {
+        // Particles may cast rays themselves while they are asked, so the slots are taken along.
+        let mut slots = with_room(|room| std::mem::take(&mut room.slots));
+        slots.resize_with(WAVE, Slot::new);
+        self.run_source(&mut slots[..width], query, lanes, &mut NoEvents);
+        with_room(|room| room.slots = slots);
+    }
+
+    /// The tree.
+    pub(crate) fn tree(&self) -> &'a WideTree {
+        self.tree
+    }
+
+    /// See [`BatchCaster::with_threads`].
+    pub(crate) fn threads(&self) -> usize {
+        self.threads
+    }
+
+    fn run_source<Q: BatchQuery, S: Source<Q>, E: Events>(
+        &self,
         slots: &mut [Slot],
         query: &mut Q,
         source: &mut S,
         events: &mut E,
     ) {
         if self.tree.has_shapes() {
-            self.wave::<Q, S, E, true>(rays, slots, query, source, events);
+            self.wave::<Q, S, E, true>(slots, query, source, events);
         } else {
-            self.wave::<Q, S, E, false>(rays, slots, query, source, events);
+            self.wave::<Q, S, E, false>(slots, query, source, events);
         }
     }
 
-    /// True if the rays are to be searched for their entries.
+    /// Where the rays are to start, the first of which is `first_ray` in the batch.
     ///
-    /// Searching pays where it answers many rays by itself, so some of them are tried.
-    fn searches(&self, rays: &[Ray]) -> bool {
+    /// Searching for entries, from cells or from where the ray before was, pays where it answers many rays
+    /// by itself, so some of them are tried.
+    fn way(&self, rays: &[Ray], first_ray: usize) -> Way {
+        let cells = self.cells_from(first_ray);
+        let climb = if cells.is_empty() { None } else { Climb::new(self.tree) };
+        let way = if climb.is_some() { Way::Cells } else { Way::Entry };
         match self.start {
-            Start::Root => return false,
-            Start::Entry => return true,
+            Start::Root => return Way::Root,
+            Start::Entry => return way,
             Start::Automatic => {}
         }
         let sample = (rays.len() / RAYS_PER_SAMPLE).min(MAX_SAMPLE);
         if sample == 0 {
-            return false;
+            return if climb.is_some() { way } else { Way::Root };
         }
-        let Some(mut path) = Path::new(self.tree) else { return false };
-        let tried = rays.iter().step_by(rays.len() / sample).take(sample);
-        let skipped = tried.filter(|ray| {
-            // SAFETY: portable code; the path is that of the tree.
-            ray.t_max < f32::INFINITY
-                && unsafe { path.enter::<Scalar, _>(self.tree, ray, &mut NoEvents).is_none() }
-        });
-        skipped.count() as f64 >= WORTHWHILE * sample as f64
+        let tried = || (0..rays.len()).step_by(rays.len() / sample).take(sample);
+        let finite = |i: &usize| rays[*i].t_max < f32::INFINITY;
+        let skipped = if let Some(mut climb) = climb {
+            let ends = |i: &usize| {
+                let cell = cells.get(*i).copied().flatten();
+                // SAFETY: portable code; the table is that of the tree.
+                let code =
+                    unsafe { climb.enter::<Scalar, _>(self.tree, &rays[*i], cell, &mut NoEvents) };
+                code.is_none()
+            };
+            tried().filter(finite).filter(ends).count()
+        } else {
+            let Some(mut path) = Path::new(self.tree) else { return Way::Root };
+            let ends = |i: &usize| {
+                // SAFETY: portable code; the path is that of the tree.
+                let code = unsafe { path.enter::<Scalar, _>(self.tree, &rays[*i], &mut NoEvents) };
+                code.is_none()
+            };
+            tried().filter(finite).filter(ends).count()
+        };
+        if skipped as f64 >= WORTHWHILE * sample as f64 { way } else { Way::Root }
     }
 
     /// The rays of `source` in the wave.
-    fn wave<Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
+    fn wave<Q: BatchQuery, S: Source<Q>, E: Events, const SHAPES: bool>(
         &self,
-        rays: &[Ray],
         slots: &mut [Slot],
         query: &mut Q,
         source: &mut S,
@@ -549,18 +644,18 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
             // SAFETY: portable code.
             Level::Scalar => unsafe {
                 wave::<super::scalar::Scalar, Q, S, E, SHAPES>(
-                    tree, geometry, rays, slots, query, source, events,
+                    tree, geometry, slots, query, source, events,
                 );
             },
             // SAFETY: `with_level` and `Level::best` give only levels this machine has.
             #[cfg(target_arch = "x86_64")]
             Level::Avx2 => unsafe {
-                wave_avx2::<Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events);
+                wave_avx2::<Q, S, E, SHAPES>(tree, geometry, slots, query, source, events);
             },
             // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             Level::Avx512 => unsafe {
-                wave_avx512::<Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events);
+                wave_avx512::<Q, S, E, SHAPES>(tree, geometry, slots, query, source, events);
             },
             #[cfg(not(target_arch = "x86_64"))]
             _ => unreachable!("only available levels can be chosen"),
@@ -600,8 +695,8 @@ struct Moved<'a, 'c, F> {
 impl<F: HitFilter> Walk for Moved<'_, '_, F> {
     fn walk<Q: BatchQuery>(self, query: &mut Q) {
         let slots = &mut self.slots[..self.rays.len().min(WAVE)];
-        let source = &mut FromRoot::new(self.order);
-        self.caster.wave::<Q, _, _, false>(self.rays, slots, query, source, &mut NoEvents);
+        let source = &mut FromRoot::new(self.rays, self.order);
+        self.caster.wave::<Q, _, _, false>(slots, query, source, &mut NoEvents);
     }
 }
 
@@ -626,19 +721,16 @@ macro_rules! instantiate {
     ($wave:ident, $beams:ident, $single:ident, $level:ty, $features:literal) => {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
-        fn $wave<Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
+        fn $wave<Q: BatchQuery, S: Source<Q>, E: Events, const SHAPES: bool>(
             tree: &WideTree,
             geometry: &Geometry,
-            rays: &[Ray],
             slots: &mut [Slot],
             query: &mut Q,
             source: &mut S,
             events: &mut E,
         ) {
             // SAFETY: this function enables the level's features.
-            unsafe {
-                wave::<$level, Q, S, E, SHAPES>(tree, geometry, rays, slots, query, source, events)
-            }
+            unsafe { wave::<$level, Q, S, E, SHAPES>(tree, geometry, slots, query, source, events) }
         }
 
         #[cfg(target_arch = "x86_64")]

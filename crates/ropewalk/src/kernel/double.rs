@@ -2,7 +2,7 @@
 
 #![allow(unsafe_code)]
 
-use super::batch::{BatchCaster, TASK};
+use super::batch::{BatchCaster, TASK, Way};
 use super::beam::Doubles;
 use super::events::{Events, NoEvents};
 use super::exact::{Exact, meet};
@@ -234,7 +234,7 @@ impl<'a, F: DoubleFilter> DoubleCaster<'a, F> {
             pairs: Pairs::EMPTY,
             gather,
         };
-        self.caster.run_wave(&narrowed, false, &mut decide, events);
+        self.caster.run_wave(&narrowed, Way::Root, 0, &mut decide, events);
         for index in beyond {
             for id in 0..self.geometry.len() as u32 {
                 if decide.offer(0, index, id).is_some() && G::ANY {

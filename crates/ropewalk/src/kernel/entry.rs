@@ -18,9 +18,11 @@
 use super::events::Events;
 use super::slot::TINY;
 use crate::aabb::Aabb;
+use crate::point::Cell;
 use crate::ray::Ray;
 use crate::wide::{
-    BLOCK_LINES, Block, LEAF, LINE, MAX_WIDE_DEPTH, Treelet, WideTree, code_line, code_offset,
+    BLOCK_LINES, Block, LEAF, LINE, MAX_WIDE_DEPTH, Treelet, UpTable, WideTree, code_line,
+    code_offset, treelet_code,
 };
 
 /// A box: the lower corner, then the negated upper one, each with a fourth lane of padding. One box
@@ -93,6 +95,13 @@ pub const fn path(child: usize) -> [usize; 3] {
 /// # Safety
 /// The methods may only run on a machine with the level's features.
 pub trait Locate: Copy {
+    /// Writes a ray in one piece: written number by number it could not be read back as vectors at once,
+    /// which costs more than all else about a segment in an empty cell.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn put(to: &mut Ray, ray: &Ray);
+
     /// The segment of a ray; its box, which holds the origin too, widened by `slack` on each side.
     ///
     /// # Safety
@@ -163,11 +172,10 @@ impl Path {
         if tree.root() == 0 || tree.root() & LEAF != 0 {
             return None;
         }
-        let cell = outer_cell(tree.bounds());
-        let scale = cell.0.iter().filter(|x| x.is_finite()).fold(0.0f32, |a, x| a.max(x.abs()));
+        let cell = corners(&tree.outer_box());
         let places = [Place { cell, code: tree.root() }; MAX_WIDE_DEPTH];
         let leaf = Place { cell: Corners::NOTHING, code: 0 };
-        Some(Path { leaf, slack: WIDER * scale + TINY, depth: 0, places })
+        Some(Path { leaf, slack: slack_of(tree), depth: 0, places })
     }
 
     /// The code of the cell from which a ray is to be walked; `None` if it hits nothing.
@@ -296,14 +304,92 @@ impl Path {
     }
 }
 
-/// The scene's box with half of its diagonal around it, so that segments may leave it: there is
-/// nothing outside that they could hit.
-fn outer_cell(bounds: &Aabb) -> Corners {
-    let margin = (bounds.diagonal() / 2.0) as f32;
-    let mut corners = [f32::NEG_INFINITY; 8];
-    for a in 0..3 {
-        corners[a] = bounds.min[a] - margin;
-        corners[a + 4] = -(bounds.max[a] + margin);
+/// A box as it is compared.
+fn corners(bounds: &Aabb) -> Corners {
+    let (low, high) = (bounds.min, bounds.max);
+    let none = f32::NEG_INFINITY;
+    Corners([low[0], low[1], low[2], none, -high[0], -high[1], -high[2], none])
+}
+
+/// The slack of the segments in a tree; see [`WIDER`].
+fn slack_of(tree: &WideTree) -> f32 {
+    let outer = tree.outer_box();
+    let coordinates = outer.min.iter().chain(&outer.max).filter(|x| x.is_finite());
+    WIDER * coordinates.fold(0.0f32, |a, x| a.max(x.abs())) + TINY
+}
+
+/// Where segments enter the tree that start in known cells.
+pub struct Climb<'a> {
+    up: &'a UpTable,
+    slack: f32,
+    /// Segments with a cell that led to a treelet below the root.
+    pub started: u64,
+    /// Other segments with a cell.
+    pub climbed: u64,
+}
+
+impl<'a> Climb<'a> {
+    /// In a tree with a table of what is above; `None` if it has none, or no treelets.
+    pub fn new(tree: &'a WideTree) -> Option<Climb<'a>> {
+        let is_treelet = tree.root() != 0 && tree.root() & LEAF == 0;
+        let up = tree.up().filter(|_| is_treelet)?;
+        Some(Climb { up, slack: slack_of(tree), started: 0, climbed: 0 })
     }
-    Corners(corners)
+
+    /// The code of the cell from which a ray is to be walked; `None` if it hits nothing. Any cell will
+    /// do: from one that the ray is not near to, the way up is long.
+    ///
+    /// # Safety
+    /// The machine must have the features of `L`, and the caller must enable them; `tree` must be
+    /// that of this climb.
+    #[inline(always)]
+    pub unsafe fn enter<L: Locate, E: Events>(
+        &mut self,
+        tree: &WideTree,
+        ray: &Ray,
+        cell: Option<Cell>,
+        events: &mut E,
+    ) -> Option<u32> {
+        let Some(mut at) = cell.and_then(|cell| self.up.number(cell.line())) else {
+            self.climbed += u64::from(cell.is_some());
+            return Some(tree.root());
+        };
+        // SAFETY: passed on to the caller; the codes of a tree lead to its cells.
+        let code = unsafe {
+            let segment = L::segment(ray, self.slack);
+            let mut above = self.up.above(at);
+            while at != 0 && !L::lies_in(&segment, &Corners(above.0)) {
+                at = above.parent();
+                above = self.up.above(at);
+            }
+            if at == 0 {
+                self.climbed += 1;
+                return Some(tree.root());
+            }
+            self.started += 1;
+            let mut code = treelet_code(above.line());
+            loop {
+                let treelet = &*tree.lines().as_ptr().add(code_offset(code)).cast::<Treelet>();
+                events.looked();
+                let reached = L::reached(&segment, treelet);
+                if reached == 0 {
+                    break 0;
+                }
+                if reached & (reached - 1) != 0 {
+                    let clear = Path::are_clear::<L, E>(tree, &segment, treelet, reached, events);
+                    break if clear { 0 } else { code };
+                }
+                code = treelet.child[reached.trailing_zeros() as usize & 7];
+                if code & LEAF != 0 {
+                    let clear = Path::is_clear::<L, E>(tree, &segment, code, events);
+                    break if clear { 0 } else { code };
+                }
+            }
+        };
+        if code == 0 {
+            events.skipped();
+            return None;
+        }
+        Some(code)
+    }
 }

@@ -36,6 +36,20 @@ unsafe fn segment(ray: &Ray, slack: f32) -> Segment {
     }
 }
 
+/// [`Locate::put`].
+///
+/// # Safety
+/// The machine must have AVX2 and FMA, and the caller must enable them.
+#[inline(always)]
+unsafe fn put(to: &mut Ray, ray: &Ray) {
+    let Ray { origin: o, dir: d, t_min, t_max } = *ray;
+    // SAFETY: the caller vouches for the features; a ray is eight floats in this order.
+    unsafe {
+        let row = _mm256_setr_ps(o[0], o[1], o[2], d[0], d[1], d[2], t_min, t_max);
+        _mm256_storeu_ps(std::ptr::from_mut(to).cast(), row);
+    }
+}
+
 /// [`Locate::lies_in`].
 ///
 /// # Safety
@@ -168,6 +182,12 @@ unsafe fn narrow(cell: &Corners, treelet: &Treelet, child: usize) -> Corners {
 macro_rules! locate {
     ($level:ty) => {
         impl Locate for $level {
+            #[inline(always)]
+            unsafe fn put(to: &mut Ray, ray: &Ray) {
+                // SAFETY: passed on to the caller.
+                unsafe { put(to, ray) }
+            }
+
             #[inline(always)]
             unsafe fn segment(ray: &Ray, slack: f32) -> Segment {
                 // SAFETY: passed on to the caller.

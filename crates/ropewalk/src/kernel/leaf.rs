@@ -80,8 +80,10 @@ impl Leaves<'_> {
                 L::test::<false>(slot, block, &mut range)
             };
             events.found(clear, open);
-            let hits = Clear { lanes: clear, range: &range, block, line };
+            let lanes_of = if Q::CANDIDATES { clear | open } else { clear };
+            let hits = Clear { lanes: lanes_of, range: &range, block, line };
             let unclear = query.take_clear::<L>(k as usize, slot, &hits, &self.exact);
+            let open = if Q::CANDIDATES { 0 } else { open };
             (open | unclear | lanes >> WIDTH << WIDTH, clear | open != 0)
         }
     }

@@ -21,11 +21,13 @@ mod entry_x86;
 mod events;
 mod exact;
 mod extreme;
+mod lanes;
 mod leaf;
 mod level;
 mod list;
 mod memory;
 mod order;
+mod particles;
 pub(crate) mod point;
 mod query;
 mod scalar;
@@ -41,15 +43,20 @@ pub use beam::BatchReport;
 pub use double::{DoubleAllHits, DoubleBatchHit, DoubleCaster, DoubleFilter};
 pub use events::BatchEvents;
 pub(crate) use events::NoEvents;
+pub use lanes::WalkReport;
+pub(crate) use lanes::{Before, Crowd, Lanes};
 pub use level::Level;
 pub(crate) use memory::Memory;
 pub use memory::SharedBytes;
+pub use particles::{Arrival, Particle, prefetch};
+pub(crate) use query::Crossings;
 pub use query::{HitFilter, Masks, NoFilter, Opacity};
 pub use sorted::Sorting;
+pub(crate) use wave::WAVE;
 
 /// Asks for the cache line of any address at all, where there is such an instruction.
 #[inline(always)]
-pub(crate) fn prefetch(address: *const u8) {
+pub(crate) fn prefetch_line(address: *const u8) {
     #[cfg(target_arch = "x86_64")]
     x86::prefetch(address);
     #[cfg(not(target_arch = "x86_64"))]

@@ -146,6 +146,11 @@ impl Simd for Scalar {
 
 impl Locate for Scalar {
     #[inline(always)]
+    unsafe fn put(to: &mut Ray, ray: &Ray) {
+        *to = *ray;
+    }
+
+    #[inline(always)]
     unsafe fn segment(ray: &Ray, slack: f32) -> Segment {
         let mut segment = Segment { corners: Corners([0.0; 8]), end: [0.0; 4] };
         for a in 0..3 {

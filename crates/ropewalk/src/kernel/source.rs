@@ -2,49 +2,64 @@
 
 #![allow(unsafe_code)]
 
-use super::entry::Path;
+use super::entry::{Climb, Path};
 use super::events::Events;
 use super::level::Simd;
+use super::query::BatchQuery;
+use crate::point::Cell;
 use crate::ray::Ray;
 use crate::wide::WideTree;
 
 /// Hands out the rays of a batch, each once.
-pub trait Source {
-    /// The next ray and the cell from which it is to be walked, `None` after the last one; rays of
-    /// which it is known that they hit nothing are put to `miss` instead.
+pub trait Source<Q: BatchQuery> {
+    /// True if what becomes of a ray decides which one comes next: answers are not put off then.
+    const WAITS: bool = false;
+
+    /// The rays by their indices; those under way stay as they are.
+    fn rays(&self) -> &[Ray];
+
+    /// The next ray for the free slot `k` and the cell from which it is to be walked, `None` if there
+    /// are no more for this slot; rays of which it is known that they hit nothing are put to
+    /// [`BatchQuery::miss`] or to whoever asked instead.
     ///
     /// # Safety
-    /// The machine must have the features of `L`, and the caller must enable them; `tree` and
-    /// `rays` must be those that the source was made for.
+    /// The machine must have the features of `L`, and the caller must enable them; `tree` must be that
+    /// which the source was made for.
     unsafe fn next<L: Simd, E: Events>(
         &mut self,
+        k: usize,
         tree: &WideTree,
-        rays: &[Ray],
-        miss: impl FnMut(usize),
+        query: &mut Q,
         events: &mut E,
     ) -> Option<(usize, u32)>;
 }
 
 /// Rays from the root.
 pub struct FromRoot<'a> {
+    rays: &'a [Ray],
     /// Indices of the rays still to come.
     order: &'a [u32],
 }
 
 impl<'a> FromRoot<'a> {
     /// The rays with these indices, in this order.
-    pub fn new(order: &'a [u32]) -> Self {
-        FromRoot { order }
+    pub fn new(rays: &'a [Ray], order: &'a [u32]) -> Self {
+        FromRoot { rays, order }
     }
 }
 
-impl Source for FromRoot<'_> {
+impl<Q: BatchQuery> Source<Q> for FromRoot<'_> {
+    #[inline(always)]
+    fn rays(&self) -> &[Ray] {
+        self.rays
+    }
+
     #[inline(always)]
     unsafe fn next<L: Simd, E: Events>(
         &mut self,
+        _k: usize,
         tree: &WideTree,
-        _rays: &[Ray],
-        _miss: impl FnMut(usize),
+        _query: &mut Q,
         _events: &mut E,
     ) -> Option<(usize, u32)> {
         let (&index, rest) = self.order.split_first()?;
@@ -54,34 +69,89 @@ impl Source for FromRoot<'_> {
 }
 
 /// All rays in order, each from its entry, searched for from where the ray before was.
-pub struct FromEntry {
+pub struct FromEntry<'a> {
+    rays: &'a [Ray],
     next: usize,
     path: Path,
 }
 
-impl FromEntry {
+impl<'a> FromEntry<'a> {
     /// From the first ray on; `path` belongs to the tree.
-    pub fn new(path: Path) -> Self {
-        FromEntry { next: 0, path }
+    pub fn new(rays: &'a [Ray], path: Path) -> Self {
+        FromEntry { rays, next: 0, path }
     }
 }
 
-impl Source for FromEntry {
+impl<Q: BatchQuery> Source<Q> for FromEntry<'_> {
+    #[inline(always)]
+    fn rays(&self) -> &[Ray] {
+        self.rays
+    }
+
     #[inline(always)]
     unsafe fn next<L: Simd, E: Events>(
         &mut self,
+        _k: usize,
         tree: &WideTree,
-        rays: &[Ray],
-        mut miss: impl FnMut(usize),
+        query: &mut Q,
         events: &mut E,
     ) -> Option<(usize, u32)> {
-        while let Some(ray) = rays.get(self.next) {
+        while let Some(ray) = self.rays.get(self.next) {
             let index = self.next;
             self.next += 1;
             // SAFETY: passed on to the caller.
             match unsafe { self.path.enter::<L, E>(tree, ray, events) } {
                 Some(code) => return Some((index, code)),
-                None => miss(index),
+                None => query.miss(index),
+            }
+        }
+        None
+    }
+}
+
+/// All rays in order, each from the cell that is given for it.
+pub struct FromCells<'a> {
+    rays: &'a [Ray],
+    /// One a ray; rays beyond its end have none.
+    cells: &'a [Option<Cell>],
+    next: usize,
+    climb: Climb<'a>,
+}
+
+impl<'a> FromCells<'a> {
+    /// From the first ray on; `climb` belongs to the tree.
+    pub fn new(rays: &'a [Ray], cells: &'a [Option<Cell>], climb: Climb<'a>) -> Self {
+        FromCells { rays, cells, next: 0, climb }
+    }
+
+    /// How the rays went.
+    pub fn into_climb(self) -> Climb<'a> {
+        self.climb
+    }
+}
+
+impl<Q: BatchQuery> Source<Q> for FromCells<'_> {
+    #[inline(always)]
+    fn rays(&self) -> &[Ray] {
+        self.rays
+    }
+
+    #[inline(always)]
+    unsafe fn next<L: Simd, E: Events>(
+        &mut self,
+        _k: usize,
+        tree: &WideTree,
+        query: &mut Q,
+        events: &mut E,
+    ) -> Option<(usize, u32)> {
+        while let Some(ray) = self.rays.get(self.next) {
+            let index = self.next;
+            self.next += 1;
+            let cell = self.cells.get(index).copied().flatten();
+            // SAFETY: passed on to the caller.
+            match unsafe { self.climb.enter::<L, E>(tree, ray, cell, events) } {
+                Some(code) => return Some((index, code)),
+                None => query.miss(index),
             }
         }
         None

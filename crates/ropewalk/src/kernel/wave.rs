@@ -26,7 +26,6 @@ use super::query::BatchQuery;
 use super::slot::{Loaded, Slot};
 use super::source::Source;
 use crate::geometry::Geometry;
-use crate::ray::Ray;
 use crate::wide::{BLOCK_LINES, LINE, WIDTH, WideTree, code_line, code_offset};
 
 /// Rays in flight on a core.
@@ -64,14 +63,11 @@ impl Tests {
 struct Wave<'a, Q, S, E> {
     tree: &'a WideTree,
     geometry: &'a Geometry,
-    exact: Exact<'a>,
     root: Root,
     slots: &'a mut [Slot],
     query: &'a mut Q,
     source: &'a mut S,
     events: &'a mut E,
-    /// True once the source has no more rays.
-    exhausted: bool,
     lists: Lists,
     /// Blocks looked at.
     tested: u64,
@@ -87,10 +83,9 @@ struct Wave<'a, Q, S, E> {
 /// The machine must have the features of `L`, and the caller must enable them: everything here is
 /// inlined into it.
 #[inline(always)]
-pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source, E: Events, const SHAPES: bool>(
+pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source<Q>, E: Events, const SHAPES: bool>(
     tree: &WideTree,
     geometry: &Geometry,
-    rays: &[Ray],
     slots: &mut [Slot],
     query: &mut Q,
     source: &mut S,
@@ -98,27 +93,24 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source, E: Events, const SHAPES: b
 ) {
     if tree.root() == 0 {
         // SAFETY: passed on to the caller.
-        while let Some((index, _)) = unsafe { source.next::<L, E>(tree, rays, |_| (), events) } {
+        while let Some((index, _)) = unsafe { source.next::<L, E>(0, tree, query, events) } {
             query.miss(index);
         }
         return;
     }
     let width = slots.len().min(WAVE);
     let slots = &mut slots[..width];
-    let exact = Exact { lines: tree.lines(), rays };
     let root = Root::new(tree.bounds(), tree.root());
     let mut lists = Lists { stepping: List::EMPTY, waiting: List::EMPTY, free: List::EMPTY };
     (0..width as u32).for_each(|k| lists.free.push(k, 0));
     let mut wave = Wave {
         tree,
         geometry,
-        exact,
         root,
         slots,
         query,
         source,
         events,
-        exhausted: false,
         lists,
         tested: 0,
         struck: 0,
@@ -126,25 +118,24 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source, E: Events, const SHAPES: b
     };
     loop {
         // SAFETY: passed on to the caller.
-        unsafe { wave.refill::<L>() };
-        while wave.lists.free.len == 0 || wave.exhausted {
+        unsafe {
+            if wave.lists.free.len > 0 {
+                wave.refill::<L>();
+            }
             if wave.lists.stepping.len + wave.lists.waiting.len == 0 {
-                // SAFETY: passed on to the caller.
-                unsafe { wave.query.settle::<L>(&exact, true) };
+                let exact = Exact { lines: tree.lines(), rays: wave.source.rays() };
+                wave.query.settle::<L>(&exact, true);
                 return;
             }
-            // SAFETY: passed on to the caller.
-            unsafe {
-                wave.step_phase::<L>();
-                if wave.lists.waiting.len * 2 >= width || wave.lists.stepping.len == 0 {
-                    wave.leaf_phase::<L, SHAPES>();
-                }
+            wave.step_phase::<L>();
+            if wave.lists.waiting.len * 2 >= width || wave.lists.stepping.len == 0 {
+                wave.leaf_phase::<L, SHAPES>();
             }
         }
     }
 }
 
-impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
+impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
     /// Every stepping ray replaces its treelet by the children it reaches.
     ///
     /// Two loops: what a step leaves on the stack is looked at only after all have stepped, so that
@@ -214,12 +205,13 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
         let free = self.lists.free.len;
         // SAFETY: passed on to the caller.
         unsafe { self.enlist::<L>(n) };
+        let exact = Exact { lines: self.tree.lines(), rays: self.source.rays() };
         for i in free..self.lists.free.len {
             let (k, _) = self.lists.free.get(i);
-            self.query.finish(k as usize, &mut self.slots[k as usize], &self.exact);
+            self.query.finish(k as usize, &mut self.slots[k as usize], &exact);
         }
         // SAFETY: passed on to the caller.
-        unsafe { self.query.settle::<L>(&self.exact, false) };
+        unsafe { self.query.settle::<L>(&exact, S::WAITS) };
     }
 
     /// Tests the leaves of the first `n` waiting rays: all first blocks, all second blocks, and so
@@ -230,7 +222,8 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
     /// tested in full at once.
     #[inline(always)]
     unsafe fn test_leaves<L: Simd, const SHAPES: bool>(&mut self, n: usize) {
-        let leaves = Leaves { tree: self.tree, geometry: self.geometry, exact: self.exact };
+        let exact = Exact { lines: self.tree.lines(), rays: self.source.rays() };
+        let leaves = Leaves { tree: self.tree, geometry: self.geometry, exact };
         let slots = self.slots.as_mut_ptr();
         let mut tests = Tests::EMPTY;
         let many = Q::MANY && self.struck as f64 >= WORTHWHILE * self.tested as f64;
@@ -309,15 +302,16 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
     unsafe fn refill<L: Simd>(&mut self) {
         let mut n = 0;
         while self.lists.free.len > 0 {
-            let (rays, miss) = (self.exact.rays, |index| self.query.miss(index));
-            // SAFETY: passed on to the caller; the codes that come back are those of the tree.
-            let next = unsafe { self.source.next::<L, E>(self.tree, rays, miss, self.events) };
-            let Some((index, code)) = next else {
-                self.exhausted = true;
-                break;
-            };
             let (k, _) = self.lists.free.get(self.lists.free.len - 1);
-            let (ray, slot) = (&rays[index], &mut self.slots[k as usize]);
+            let (source, query, events) = (&mut *self.source, &mut *self.query, &mut *self.events);
+            // SAFETY: passed on to the caller; the codes that come back are those of the tree.
+            let next = unsafe { source.next::<L, E>(k as usize, self.tree, query, events) };
+            let Some((index, code)) = next else {
+                // There is nothing more for this slot.
+                self.lists.free.len -= 1;
+                continue;
+            };
+            let (ray, slot) = (&self.source.rays()[index], &mut self.slots[k as usize]);
             // SAFETY: passed on to the caller.
             let loaded = unsafe { L::load(slot, ray, index as u32, &self.root) };
             if loaded == Loaded::Extreme {
@@ -346,7 +340,12 @@ impl<Q: BatchQuery, S: Source, E: Events> Wave<'_, Q, S, E> {
     #[cold]
     fn walk_extreme(&mut self, k: u32) {
         let slot = &mut self.slots[k as usize];
-        extreme::walk(self.tree, self.geometry, &self.exact, (k as usize, slot), self.query);
-        self.query.finish(k as usize, slot, &self.exact);
+        let exact = Exact { lines: self.tree.lines(), rays: self.source.rays() };
+        if Q::CANDIDATES {
+            self.query.gather(self.tree, k as usize);
+        } else {
+            extreme::walk(self.tree, self.geometry, &exact, (k as usize, slot), self.query);
+        }
+        self.query.finish(k as usize, slot, &exact);
     }
 }

@@ -14,6 +14,12 @@ pub struct Cell(
 impl Cell {
     const ROOT: Cell = Cell(0);
 
+    /// The line of its treelet, if it is a cell of a tree.
+    #[inline(always)]
+    pub(crate) fn line(self) -> u32 {
+        self.0 / CHILDREN
+    }
+
     /// As a number, to be stored.
     pub fn to_bits(self) -> u32 {
         self.0

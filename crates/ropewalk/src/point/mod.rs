@@ -5,11 +5,11 @@
 //! everywhere. docs/numerics.md has the rules and why a walk finds what brute force finds.
 
 mod brute_force;
-mod cells;
+pub(crate) mod cells;
 pub(crate) mod expansion;
 mod order;
 mod queries;
-mod side;
+pub(crate) mod side;
 mod winding;
 
 pub use brute_force::PointBruteForce;

@@ -75,11 +75,11 @@ fn holds(axis: usize, a: [f64; 3], b: [f64; 3], c: [f64; 3], p: [f64; 3]) -> boo
 
 /// A difference of two products is off by less than this share of the sum of their sizes: four
 /// roundings of 2^-53 each, twice over.
-const TURN_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
+pub const TURN_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
 
 /// The sign of the area of `a`, `b`, `p` as seen along the axis that is not in `axes`; `a` and `b` are
 /// `f32` numbers.
-fn turn([x, y]: [usize; 2], a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> i32 {
+pub fn turn([x, y]: [usize; 2], a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> i32 {
     let m = (b[x] - a[x]) * (p[y] - a[y]);
     let n = (b[y] - a[y]) * (p[x] - a[x]);
     let (area, size) = (m - n, m.abs() + n.abs());
@@ -114,7 +114,7 @@ fn moved_turn(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> i32 {
 const PLANE_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
 
 /// The side of the plane of a triangle on which a point lies: 1 in front; vertices are `f32` numbers.
-fn side_of_plane(a: [f64; 3], b: [f64; 3], c: [f64; 3], p: [f64; 3]) -> i32 {
+pub fn side_of_plane(a: [f64; 3], b: [f64; 3], c: [f64; 3], p: [f64; 3]) -> i32 {
     let (mut sum, mut size) = (0.0, 0.0);
     for i in 0..3 {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);

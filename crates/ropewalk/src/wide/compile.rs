@@ -10,6 +10,7 @@ use crate::geometry::Geometry;
 use crate::primitive::{Primitive, Shape, Sides, Triangle};
 use crate::tree::{BspTree, NodeKind};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -87,7 +88,16 @@ impl WideTree {
         let Compiler { mut lines, next, runs, overflow, .. } = compiler;
         debug_assert_eq!(next as usize, needed);
         let has_shapes = fill(&mut lines, &runs, (tree, geometry, is_left_out), parallel);
-        Ok(WideTree { bounds: tree.bounds(), root, lines, treelets, blocks, overflow, has_shapes })
+        Ok(WideTree {
+            bounds: tree.bounds(),
+            root,
+            lines,
+            treelets,
+            blocks,
+            overflow,
+            has_shapes,
+            up: OnceLock::new(),
+        })
     }
 }
 

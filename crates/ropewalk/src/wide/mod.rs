@@ -8,6 +8,7 @@ mod block;
 mod compile;
 mod lines;
 mod treelet;
+mod up;
 mod validate;
 
 pub use block::{Block, ID_MASK, NO_ID, SIDES_BACK, SIDES_BOTH, SIDES_FRONT, WIDTH};
@@ -16,10 +17,12 @@ pub use treelet::{
     AXIS_SHIFTS, COUNT_BITS, COUNT_OVERFLOW, Flips, LEAF, LEVELS, MAX_LINES, ORDER, OrderTable,
     Treelet, code_line, code_offset, leaf_code, treelet_code,
 };
+pub use up::{Above, UpTable};
 pub use validate::WideFault;
 
 use crate::aabb::Aabb;
 use crate::file::Header;
+use std::sync::OnceLock;
 
 /// Largest number of treelets on a path; sizes the stacks of the kernels.
 pub const MAX_WIDE_DEPTH: usize = crate::tree::MAX_DEPTH.div_ceil(LEVELS);
@@ -34,6 +37,7 @@ pub struct WideTree {
     blocks: usize,
     overflow: Vec<(u32, u32)>,
     has_shapes: bool,
+    up: OnceLock<UpTable>,
 }
 
 /// Why a tree cannot be compiled.
@@ -81,6 +85,7 @@ impl WideTree {
             blocks: header.blocks as usize,
             overflow,
             has_shapes: header.has_shapes,
+            up: OnceLock::new(),
         }
     }
 
@@ -99,6 +104,30 @@ impl WideTree {
     #[inline(always)]
     pub fn lines(&self) -> &Lines {
         &self.lines
+    }
+
+    /// Makes the table by which queries start from cells, if it is not there yet: some 3 to 5 % of the
+    /// tree's bytes.
+    pub fn link_up(&self) -> &UpTable {
+        self.up.get_or_init(|| UpTable::new(self, &self.outer_box()))
+    }
+
+    /// The table, if it was made; see [`WideTree::link_up`].
+    #[inline(always)]
+    pub fn up(&self) -> Option<&UpTable> {
+        self.up.get()
+    }
+
+    /// The scene's box with half of its diagonal around it, so that segments may leave it: there is
+    /// nothing outside that they could hit.
+    pub(crate) fn outer_box(&self) -> Aabb {
+        let margin = (self.bounds.diagonal() / 2.0) as f32;
+        let mut outer = self.bounds;
+        for a in 0..3 {
+            outer.min[a] -= margin;
+            outer.max[a] += margin;
+        }
+        outer
     }
 
     /// Number of treelets.
@@ -135,7 +164,8 @@ impl WideTree {
         self.has_shapes
     }
 
-    /// Bytes of the tree, its own copy of the triangles included.
+    /// Bytes of the tree, its own copy of the triangles included, without the table of
+    /// [`WideTree::link_up`].
     pub fn bytes(&self) -> usize {
         self.lines.len() * LINE + size_of_val(&self.overflow[..])
     }

@@ -3,9 +3,11 @@
 mod beam;
 mod bench;
 mod builders;
+mod cells;
 mod entry;
 mod exact;
 mod parts;
 mod ropes;
 mod scenes;
+mod walker;
 mod wave;

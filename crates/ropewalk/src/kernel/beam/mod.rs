@@ -158,6 +158,11 @@ pub struct BatchReport {
     pub wave_rays: u64,
     /// Of these, rays whose entries were searched for; see [`Start`](super::Start).
     pub entry_rays: u64,
+    /// Of these, rays that started from the cell that was given for them or from a treelet above it; see
+    /// [`BatchCaster::with_cells`](super::BatchCaster::with_cells).
+    pub cell_rays: u64,
+    /// Rays whose cell led up to the root: of another tree, or far from where the ray goes.
+    pub climbed_rays: u64,
     /// Of these, rays that were sorted; see [`Sorting`](super::Sorting).
     pub sorted_rays: u64,
     /// Beams tried.
@@ -182,6 +187,8 @@ impl std::ops::Add for BatchReport {
             beam_rays: self.beam_rays + other.beam_rays,
             wave_rays: self.wave_rays + other.wave_rays,
             entry_rays: self.entry_rays + other.entry_rays,
+            cell_rays: self.cell_rays + other.cell_rays,
+            climbed_rays: self.climbed_rays + other.climbed_rays,
             sorted_rays: self.sorted_rays + other.sorted_rays,
             beams: self.beams + other.beams,
             given_up: self.given_up + other.given_up,

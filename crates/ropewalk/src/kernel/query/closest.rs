@@ -17,6 +17,8 @@ pub struct Closest<'a> {
     /// Finished rays whose hit is known but not its exact parameter, and where it lies.
     pending: [(Sheared, At); 2 * PENDING],
     count: usize,
+    /// The same eight at a time; lanes that are not in use hold anything.
+    pairs: [Pairs; 2 * PENDING / WIDTH],
 }
 
 /// Exact parameters are worked out once so many rays at least wait for them: these do not wait for
@@ -28,7 +30,19 @@ const _: () = assert!(WAVE <= PENDING);
 impl<'a> Closest<'a> {
     /// Hits go to `t`, infinite for a miss, and `prim`, `u32::MAX` for a miss.
     pub fn new(t: &'a mut [f32], prim: &'a mut [u32]) -> Self {
-        Closest { t, prim, pending: [(Sheared::default(), 0); 2 * PENDING], count: 0 }
+        Closest {
+            t,
+            prim,
+            pending: [(Sheared::default(), 0); 2 * PENDING],
+            count: 0,
+            pairs: [Pairs::EMPTY; 2 * PENDING / WIDTH],
+        }
+    }
+
+    /// The answer to a ray, once it is settled.
+    #[inline(always)]
+    pub fn answer(&self, ray: usize) -> (f32, u32) {
+        (self.t[ray], self.prim[ray])
     }
 
     /// Finds the exact parameter of the best hit so far.
@@ -50,11 +64,10 @@ impl<'a> Closest<'a> {
     #[inline(always)]
     unsafe fn settle_pending<L: Simd>(&mut self, exact: &Exact<'_>) {
         let pending = &self.pending[..std::mem::take(&mut self.count)];
-        let mut pairs = [Pairs::EMPTY; 2 * PENDING / WIDTH];
         for (i, (ray, at)) in pending.iter().enumerate() {
-            pairs[i / WIDTH].set(i, ray, exact.lines, *at);
+            self.pairs[i / WIDTH].set(i, ray, exact.lines, *at);
         }
-        for (pairs, pending) in pairs.iter().zip(pending.chunks(WIDTH)) {
+        for (pairs, pending) in self.pairs.iter().zip(pending.chunks(WIDTH)) {
             let mut t = [0.0; WIDTH];
             // SAFETY: passed on to the caller.
             let open = unsafe { pairs.meet::<L::Doubles>(&mut t) };
@@ -127,7 +140,7 @@ impl BatchQuery for Closest<'_> {
 
     #[inline(always)]
     unsafe fn settle<L: Simd>(&mut self, exact: &Exact<'_>, all: bool) {
-        if self.count >= PENDING || all {
+        if self.count >= PENDING || (all && self.count > 0) {
             // SAFETY: passed on to the caller.
             unsafe { self.settle_pending::<L>(exact) };
         }

@@ -5,12 +5,14 @@
 mod any;
 mod closest;
 mod count;
+mod crossings;
 mod every;
 mod filtered;
 
 pub use any::Any;
 pub use closest::Closest;
 pub use count::Count;
+pub use crossings::Crossings;
 pub use every::Every;
 pub use filtered::{Filtered, HitFilter, Masks, NoFilter, Opacity};
 
@@ -18,7 +20,7 @@ use super::exact::{Exact, place};
 use super::level::{Range, Simd};
 use super::slot::Slot;
 use crate::ray::Hit;
-use crate::wide::Block;
+use crate::wide::{Block, WideTree};
 
 /// The lanes of a block that the filter is sure of: each is hit at a parameter in `range`, all of
 /// which the ray accepts.
@@ -43,6 +45,10 @@ pub trait BatchQuery {
     /// True if hits end no ray, so that blocks may well have several: they are tested in full at once
     /// where that pays.
     const MANY: bool = false;
+
+    /// True if the query decides by itself: [`BatchQuery::take_clear`] then gets all lanes that may be
+    /// hit, and nothing comes by [`BatchQuery::take`].
+    const CANDIDATES: bool = false;
 
     /// Takes hits whose exact parameters may not matter for the slot numbered `k`; the lanes for which
     /// they do are returned and come again by [`BatchQuery::take`].
@@ -79,6 +85,11 @@ pub trait BatchQuery {
 
     /// Ray `index` hits nothing, unless [`BatchQuery::finish`] says otherwise later on.
     fn miss(&mut self, index: usize);
+
+    /// Collects all that the ray of slot `k` may hit by itself, its numbers being too large or too small
+    /// for the filters; only asked where [`BatchQuery::CANDIDATES`] is set.
+    #[cold]
+    fn gather(&mut self, _tree: &WideTree, _k: usize) {}
 
     /// Some rays have finished, or all: answers that were put off may be worked out now, in the latter
     /// case they must be.

@@ -1,0 +1,270 @@
+//! Particles that are moved segment by segment, with every triangle that they cross on the way.
+//!
+//! [`Walker`] holds many particles and moves each along a list of segments, many at once; [`crossings`]
+//! defines what it reports. Which triangles a segment crosses is decided without rounding, by a rule
+//! under which the segments of a particle join: nothing is crossed twice or not at all where one ends
+//! and the next begins, also in a face, on an edge or in a vertex. docs/numerics.md has the rule.
+//!
+//! Particles that decide by themselves where to go next are moved by
+//! [`BatchCaster::walk`](crate::kernel::BatchCaster::walk).
+
+mod crossing;
+mod lists;
+
+pub use crossing::Crossed;
+pub(crate) use crossing::crossing;
+
+use crate::geometry::Geometry;
+use crate::kernel::{BatchCaster, Crossings, Lanes, Level, WAVE, WalkReport};
+use crate::point::cells::locate;
+use crate::point::{Cell, PointError};
+use crate::primitive::{Primitive, Shape};
+use crate::wide::WideTree;
+use lists::{Lists, Record};
+use rayon::prelude::*;
+
+/// What a particle does at a triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Encounter {
+    /// It passes through, and the crossing is noted.
+    #[default]
+    Pass,
+    /// It stops there: the rest of its list is left out.
+    Stop,
+}
+
+/// What particles met, in compressed rows: the events of particle `i` are `offsets[i]..offsets[i + 1]`, in
+/// the order of its segments, in each by the share of the segment before the crossing, and at equal
+/// shares by primitive.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Events {
+    /// Row starts; one more than there are particles.
+    pub offsets: Vec<usize>,
+    /// The segment, counted from the first of the particle's list.
+    pub segment: Vec<u32>,
+    /// Where on the segment, in lengths of its direction.
+    pub t: Vec<f32>,
+    /// The triangle.
+    pub prim_id: Vec<u32>,
+    /// True if the particle goes from the front to the back of the triangle: into a body whose fronts
+    /// look outwards.
+    pub entering: Vec<bool>,
+    /// Segments that each particle began: all of its list, or fewer if it stopped.
+    pub walked: Vec<u32>,
+    /// Segments left out since they have no end: a number that is NaN, infinite or beyond
+    /// [`LARGEST`], or a negative length.
+    pub invalid: usize,
+    /// How the segments went; which way they go changes no event.
+    pub report: WalkReport,
+}
+
+/// Largest coordinate of a particle.
+pub const LARGEST: f32 = 1e30;
+
+/// Particles that one task of a parallel batch moves.
+const TASK: usize = 1024;
+
+/// All crossings of the segment from `from` to `to` in order, found by going through all triangles: the
+/// definition of what [`Walker`] reports.
+pub fn crossings(geometry: &Geometry, from: [f32; 3], to: [f32; 3]) -> Vec<Crossed> {
+    let of = |prim_id: u32| {
+        let Shape::Triangle(triangle) = geometry.shape(prim_id) else { return None };
+        if triangle.is_degenerate() {
+            return None;
+        }
+        let (share, entering) = crossing(from, to, &triangle.vertices)?;
+        Some(Crossed { share, prim_id, entering })
+    };
+    let mut found: Vec<Crossed> = (0..geometry.len() as u32).filter_map(of).collect();
+    found.sort_by(|a, b| a.share.total_cmp(&b.share).then(a.prim_id.cmp(&b.prim_id)));
+    found
+}
+
+/// The end of a segment, rounded to `f32` once; `None` if it has none.
+pub fn end_of(from: [f32; 3], direction: [f32; 3], length: f32) -> Option<[f32; 3]> {
+    let end = |a: usize| f64::from(from[a]) + f64::from(direction[a]) * f64::from(length);
+    let to: [f32; 3] = std::array::from_fn(|a| end(a) as f32);
+    let fits = |p: &[f32; 3]| p.iter().all(|x| x.abs() <= LARGEST);
+    (length >= 0.0 && fits(&from) && fits(&to)).then_some(to)
+}
+
+/// Particles in a scene of triangles.
+///
+/// Positions are `f32`. A segment leads from where its particle is to [`end_of`] its direction and
+/// length; what it crosses is what [`crossings`] says about these two points, whatever the level, the
+/// number of threads and the other particles. On which sides a triangle can be hit does not matter, and
+/// triangles without area are never met.
+///
+/// A particle that is stopped stands where the segment crosses the triangle, rounded, and its next segment
+/// passes this triangle without a further event, to either side.
+pub struct Walker<'a> {
+    caster: BatchCaster<'a>,
+    tree: &'a WideTree,
+    positions: Vec<[f32; 3]>,
+    /// The triangle at which each particle was stopped, which its next segment passes; `u32::MAX` for
+    /// none.
+    stopped: Vec<u32>,
+}
+
+impl<'a> Walker<'a> {
+    /// Particles at these positions, moved at the best level of this machine on all threads of the
+    /// current rayon pool.
+    ///
+    /// # Errors
+    /// [`PointError::NotTriangles`] if a leaf of the tree holds anything but triangles.
+    pub fn new(
+        tree: &'a WideTree,
+        geometry: &'a Geometry,
+        positions: Vec<[f32; 3]>,
+    ) -> Result<Self, PointError> {
+        if tree.has_shapes() {
+            return Err(PointError::NotTriangles);
+        }
+        let stopped = vec![u32::MAX; positions.len()];
+        Ok(Walker { caster: BatchCaster::new(tree, geometry), tree, positions, stopped })
+    }
+
+    /// The same with another level, or `None` if this machine lacks it.
+    pub fn with_level(self, level: Level) -> Option<Self> {
+        Some(Walker { caster: self.caster.with_level(level)?, ..self })
+    }
+
+    /// The same on the calling thread only (`1`) or on the current rayon pool (`0`).
+    pub fn with_threads(self, threads: usize) -> Self {
+        Walker { caster: self.caster.with_threads(threads), ..self }
+    }
+
+    /// Where the particles are.
+    pub fn positions(&self) -> &[[f32; 3]] {
+        &self.positions
+    }
+
+    /// The triangle at which each particle was stopped by its last segment; `u32::MAX` for none.
+    pub fn stopped_at(&self) -> &[u32] {
+        &self.stopped
+    }
+
+    /// The same with particles that were stopped before, as [`Walker::stopped_at`] said: where a walk goes
+    /// on.
+    ///
+    /// # Panics
+    /// If there are not as many as particles.
+    pub fn with_stopped(self, stopped: Vec<u32>) -> Self {
+        assert!(stopped.len() == self.positions.len(), "one entry a particle");
+        Walker { stopped, ..self }
+    }
+
+    /// Puts particles elsewhere, as many as there were; none of them is stopped there.
+    ///
+    /// # Panics
+    /// If there are more or fewer.
+    pub fn set_positions(&mut self, positions: &[[f32; 3]]) {
+        self.positions.copy_from_slice(positions);
+        self.stopped.fill(u32::MAX);
+    }
+
+    /// The leaves in which the particles are; `None` outside of the tree's box.
+    pub fn cells(&self) -> Vec<Option<Cell>> {
+        let cell = |p: &[f32; 3]| locate(self.tree, p.map(f64::from));
+        if self.caster.threads() == 1 {
+            return self.positions.iter().map(cell).collect();
+        }
+        self.positions.par_iter().with_min_len(TASK).map(cell).collect()
+    }
+
+    /// Moves each particle along one segment: a direction, which need not be normalised, and a length in
+    /// lengths of the direction.
+    ///
+    /// # Panics
+    /// If there are more or fewer directions or lengths than particles.
+    pub fn advance(
+        &mut self,
+        directions: &[[f32; 3]],
+        lengths: &[f32],
+        encounter: Encounter,
+    ) -> Events {
+        let offsets: Vec<usize> = (0..=self.positions.len()).collect();
+        self.run(&offsets, directions, lengths, encounter)
+    }
+
+    /// Moves particle `i` along the segments `offsets[i]..offsets[i + 1]`, one after the other, each from
+    /// where the one before ended.
+    ///
+    /// # Panics
+    /// If there is not one offset more than particles, if they descend or lead beyond the segments, or if
+    /// there are not as many directions as lengths.
+    pub fn run(
+        &mut self,
+        offsets: &[usize],
+        directions: &[[f32; 3]],
+        lengths: &[f32],
+        encounter: Encounter,
+    ) -> Events {
+        let n = self.positions.len();
+        assert!(offsets.len() == n + 1 && offsets.is_sorted(), "one row a particle");
+        assert!(directions.len() == lengths.len(), "one length a direction");
+        assert!(offsets[n] <= lengths.len(), "rows lie within the segments");
+        let mut walked = vec![0u32; n];
+        let serial = self.caster.threads() == 1 || n <= TASK;
+        let task = if serial { n.max(1) } else { TASK };
+        let caster = self.caster;
+        let parts = self.positions.chunks_mut(task).zip(self.stopped.chunks_mut(task));
+        let parts = parts.zip(walked.chunks_mut(task)).enumerate();
+        let tasks: Vec<Lists<'_>> = parts
+            .map(|(i, ((positions, stopped), walked))| {
+                let rows = &offsets[i * task..=i * task + positions.len()];
+                Lists::new(rows, (directions, lengths), (positions, stopped, walked), encounter)
+            })
+            .collect();
+        let run = |lists: Lists<'_>| {
+            let width = lists.len().min(WAVE);
+            let mut lanes = Lanes::new(caster.tree(), width, lists);
+            caster.run_lanes(width, &mut Crossings::new(), &mut lanes);
+            let (lists, report) = lanes.into_parts();
+            (lists.into_records(), report)
+        };
+        let parts: Vec<((Vec<Record>, usize), WalkReport)> = if serial {
+            tasks.into_iter().map(run).collect()
+        } else {
+            tasks.into_par_iter().map(run).collect()
+        };
+        gather(&parts, task, walked)
+    }
+}
+
+/// The rows of all tasks.
+fn gather(parts: &[((Vec<Record>, usize), WalkReport)], task: usize, walked: Vec<u32>) -> Events {
+    let total = parts.iter().map(|((records, _), _)| records.len()).sum();
+    let mut events = Events {
+        offsets: vec![0; walked.len() + 1],
+        segment: vec![0; total],
+        t: vec![0.0; total],
+        prim_id: vec![0; total],
+        entering: vec![false; total],
+        walked,
+        invalid: parts.iter().map(|((_, invalid), _)| invalid).sum(),
+        report: parts.iter().fold(WalkReport::default(), |sum, (_, report)| sum + *report),
+    };
+    let all = || {
+        parts.iter().enumerate().flat_map(move |(i, ((records, _), _))| {
+            records.iter().map(move |record| (i * task + record.particle as usize, record))
+        })
+    };
+    for (particle, _) in all() {
+        events.offsets[particle + 1] += 1;
+    }
+    for i in 1..events.offsets.len() {
+        events.offsets[i] += events.offsets[i - 1];
+    }
+    // The records of a particle are in order, those of several mixed.
+    let mut next = events.offsets.clone();
+    for (particle, record) in all() {
+        let at = next[particle];
+        next[particle] += 1;
+        events.segment[at] = record.segment;
+        events.t[at] = record.t;
+        events.prim_id[at] = record.hit.prim_id;
+        events.entering[at] = record.hit.entering;
+    }
+    events
+}
