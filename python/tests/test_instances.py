@@ -41,10 +41,10 @@ def test_instances_equal_moved_meshes(offset):
     ]
     same = ropewalk.Scene.from_meshes(moved, precision="double")
     origins = rng.uniform(-2, 2, (20_000, 3)) + offset
-    directions = rng.normal(size=(20_000, 3))
+    directions = rng.uniform(-0.8, 0.8, (20_000, 3)) + offset - origins
     close = {"rtol": 1e-9, "atol": 1e-9 * (1 + offset)}
     a, b = scene.closest_hit(origins, directions), same.closest_hit(origins, directions)
-    assert a.hit.mean() > 0.2
+    assert a.hit.mean() > 0.1
     np.testing.assert_array_equal(a.prim_id, b.prim_id)
     np.testing.assert_array_equal(a.geom_id, b.geom_id)
     np.testing.assert_allclose(a.t, b.t, **close)
