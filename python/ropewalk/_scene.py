@@ -19,6 +19,7 @@ from ._arrays import (
     as_masks,
     as_points,
     as_rows,
+    as_threads,
     per_ray,
 )
 from ._errors import (
@@ -29,6 +30,7 @@ from ._errors import (
     PrecisionWarning,
 )
 from ._hits import HitLists, Hits, make_hits, make_lists
+from ._points import PointMethods
 from ._report import Report, plural, report_of, size_of
 from ._ropewalk import Core, Rays, default_threads
 
@@ -40,9 +42,6 @@ if TYPE_CHECKING:
 #: Up to so many rays are answered on the calling thread: waking others would take longer.
 _FEW_RAYS = 2048
 
-#: The most threads that can be asked for.
-_MAX_THREADS = 1024
-
 #: Rounding by more than this share of the box's diagonal is warned of: 2^-25 is what rounding to
 #: float32 costs an object around the origin, this is an object 32 times its size away.
 _PRECISION = 2.0**-20
@@ -50,7 +49,7 @@ _PRECISION = 2.0**-20
 _ALL_BITS = 0xFFFF_FFFF
 
 
-class Scene:
+class Scene(PointMethods):
     """Triangles that rays can be cast at. A scene never changes and can be used by many threads.
 
     Args:
@@ -77,7 +76,7 @@ class Scene:
     1.0
     """
 
-    __slots__ = ("__weakref__", "_core", "_report", "_starts")
+    __slots__ = ("__weakref__", "_core", "_points", "_report", "_starts")
 
     _core: Core
 
@@ -151,6 +150,7 @@ class Scene:
 
     def _adopt(self, core: Core) -> None:
         self._core = core
+        self._points = None
         self._starts = np.asarray(core.starts, np.int64)
         self._report: Report | None = None
 
@@ -579,7 +579,7 @@ def _preset(preset: str) -> str:
 
 
 def _threads(threads: int) -> int:
-    return as_integer(threads, "threads", 0, _MAX_THREADS) or default_threads()
+    return as_threads(threads)
 
 
 def _mesh(vertices: ArrayLike, faces: ArrayLike, name: str) -> tuple[np.ndarray, np.ndarray]:

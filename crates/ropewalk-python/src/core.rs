@@ -35,8 +35,8 @@ const TASKS_PER_THREAD: usize = 4;
 /// A geometry of one or more meshes and the tree over it. It never changes.
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
 pub struct Core {
-    geometry: Geometry,
-    tree: WideTree,
+    pub(crate) geometry: Geometry,
+    pub(crate) tree: WideTree,
     report: BuildReport,
     /// The first primitive of each mesh, and the number of primitives.
     starts: Vec<u32>,
@@ -499,7 +499,7 @@ impl Core {
     }
 
     /// Numbers primitives within their meshes; misses become -1.
-    fn number(&self, prim: &mut [u32], geom: &mut [i32]) {
+    pub(crate) fn number(&self, prim: &mut [u32], geom: &mut [i32]) {
         if self.masks.len() == 1 {
             for (prim, geom) in prim.iter().zip(geom) {
                 *geom = -i32::from(*prim == u32::MAX);
@@ -621,6 +621,6 @@ fn checked<T>(len: usize) -> PyResult<usize> {
     }
 }
 
-fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> PyResult<Vec<T>> {
+pub(crate) fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> PyResult<Vec<T>> {
     Ok(vec![T::zeroed(); checked::<T>(len)?])
 }

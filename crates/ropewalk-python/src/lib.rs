@@ -9,6 +9,7 @@
 
 mod core;
 mod error;
+mod points;
 mod rays;
 mod state;
 mod surface;
@@ -23,6 +24,8 @@ mod _ropewalk {
 
     #[pymodule_export]
     use crate::core::Core;
+    #[pymodule_export]
+    use crate::points::Points;
     #[pymodule_export]
     use crate::rays::Rays;
 

@@ -76,5 +76,5 @@ pub fn closest(geometry: &Geometry, point: [f64; 3], distance2: f64, prim_id: u3
     let foot = nearest_foot(point, &triangle.vertices);
     let [a, b, c] = triangle.vertices.map(|v| v.map(f64::from));
     let on = |i: usize| a[i] + (foot.v * (b[i] - a[i]) + foot.w * (c[i] - a[i]));
-    ClosestPoint { distance, prim_id, point: std::array::from_fn(on) }
+    ClosestPoint { distance, prim_id, point: std::array::from_fn(on), uv: [foot.v, foot.w] }
 }

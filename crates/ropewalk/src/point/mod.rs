@@ -36,4 +36,6 @@ pub struct ClosestPoint {
     pub prim_id: u32,
     /// The point of it.
     pub point: [f64; 3],
+    /// Weights of its vertices 1 and 2 at that point.
+    pub uv: [f64; 2],
 }

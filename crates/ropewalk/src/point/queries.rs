@@ -32,6 +32,8 @@ pub struct ClosestPoints {
     pub prim_id: Vec<u32>,
     /// The nearest point of it; NaN without one.
     pub point: Vec<[f64; 3]>,
+    /// Weights of the triangle's vertices 1 and 2 at that point; NaN without one.
+    pub uv: Vec<[f64; 2]>,
 }
 
 /// Why points cannot be answered.
@@ -87,7 +89,12 @@ impl<'a> PointQueries<'a> {
 
     /// The nearest triangle of each point and the nearest point of it.
     pub fn closest_point(&self, points: &[[f64; 3]]) -> ClosestPoints {
-        let nothing = ClosestPoint { distance: f64::NAN, prim_id: u32::MAX, point: [f64::NAN; 3] };
+        let nothing = ClosestPoint {
+            distance: f64::NAN,
+            prim_id: u32::MAX,
+            point: [f64::NAN; 3],
+            uv: [f64::NAN; 2],
+        };
         let all = self.in_order(points, nothing, |points, answers| {
             let found = self.found(points);
             for ((point, found), answer) in points.iter().zip(found).zip(answers) {
@@ -101,6 +108,7 @@ impl<'a> PointQueries<'a> {
             distance: all.iter().map(|nearest| nearest.distance).collect(),
             prim_id: all.iter().map(|nearest| nearest.prim_id).collect(),
             point: all.iter().map(|nearest| nearest.point).collect(),
+            uv: all.iter().map(|nearest| nearest.uv).collect(),
         }
     }
 
@@ -170,6 +178,16 @@ impl<'a> PointQueries<'a> {
     /// The box of a leaf; `None` if the tree has no such leaf.
     pub fn cell_box(&self, cell: Cell) -> Option<Aabb> {
         cells::cell_box(self.tree, cell)
+    }
+
+    /// All leaves, empty ones included, in the order of their numbers.
+    pub fn cells(&self) -> Vec<Cell> {
+        cells::cells(self.tree)
+    }
+
+    /// The primitives that a leaf refers to, each once; none if the tree has no such leaf.
+    pub fn cell_primitives(&self, cell: Cell) -> Vec<u32> {
+        cells::cell_primitives(self.tree, cell)
     }
 
     /// What [`PointQueries::closest_point`] does, counted, on one thread: steps are treelets, `met` blocks
