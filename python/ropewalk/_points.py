@@ -160,7 +160,8 @@ class PointMethods:
                 without rounding, also on edges and vertices, so that a point of the surface counts as
                 inside and one beside it as what it is. Which way faces turn does not matter, coincident
                 ones cancel. ``"winding"`` for surfaces with holes: a generalised winding number
-                above 0.5; faces must turn counter-clockwise as seen from outside.
+                above 0.5; faces must turn counter-clockwise as seen from outside. Decided as the sum
+                over all faces decides, which is only taken where a bound on its error leaves doubt.
 
         Points without an answer (NaN) are not inside.
 
@@ -178,20 +179,32 @@ class PointMethods:
                 f"method: expected 'parity' or 'winding', found {method!r}", "method"
             )
         values, shape, threads = _given(points, threads, strict)
-        if method == "winding":
-            return (self._ask().winding_number(values, threads) > 0.5).reshape(shape)
-        return self._ask().contains(values, threads).reshape(shape)
+        return self._ask().contains(values, method == "winding", threads).reshape(shape)
 
     def winding_number(
-        self, points: ArrayLike, *, threads: int = 0, strict: bool = False
+        self,
+        points: ArrayLike,
+        *,
+        accuracy: float = 0.01,
+        threads: int = 0,
+        strict: bool = False,
     ) -> NDArray[np.float64]:
         """The generalised winding number of each point: float64, in the points' shape.
 
         1 inside of a closed surface whose faces turn counter-clockwise as seen from outside, 0 outside,
         in between near holes; NaN for points without an answer.
 
-        Arguments and errors are those of :meth:`closest_point`. After Jacobson, Kavan and
-        Sorkine-Hornung (2013).
+        Args:
+            points: as for :meth:`closest_point`, as ``threads`` and ``strict`` are.
+            accuracy: how far a number may be from the sum over all faces, 0 or more: a proven bound,
+                mostly missed by far (thirty times at 0.01). 0 takes the sum itself, in time that grows
+                with the number of faces.
+
+        Raises:
+            ArgumentError, ArgumentTypeError, InvalidPointError: as :meth:`closest_point`.
+
+        After Jacobson, Kavan and Sorkine-Hornung (2013); faces far away count by their moments (Barill et
+        al. 2018), which the first call makes.
 
         >>> import ropewalk
         >>> v = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -199,8 +212,13 @@ class PointMethods:
         >>> float(scene.winding_number([0.1, 0.1, 0.1]).round(6))
         1.0
         """
+        off = as_array(accuracy, "accuracy")
+        if off.size != 1 or not off >= 0:
+            raise ArgumentError(
+                f"accuracy: expected a number, 0 or more, found {accuracy!r}", "accuracy"
+            )
         values, shape, threads = _given(points, threads, strict)
-        return self._ask().winding_number(values, threads).reshape(shape)
+        return self._ask().winding_number(values, float(off.item()), threads).reshape(shape)
 
     def locate(
         self, points: ArrayLike, *, threads: int = 0, strict: bool = False

@@ -133,8 +133,12 @@ def test_parity_is_winding_on_closed_surfaces(scale, offset):
     v, f = ball(3, scale, offset)
     scene = ropewalk.Scene(v.astype(np.float32), f)
     p = rng.uniform(-1.2, 1.2, (2000, 3)) * scale + offset
-    number = scene.winding_number(p)
+    number = scene.winding_number(p, accuracy=0)
     assert (np.abs(number - number.round()) < 1e-6).all()
+    for accuracy in (0.2, 0.01, 1e-4):
+        off = np.abs(scene.winding_number(p, accuracy=accuracy) - number)
+        assert off.max() <= accuracy
+    assert np.abs(scene.winding_number(p) - number).max() <= 0.01
     np.testing.assert_array_equal(scene.contains(p), number.round() == 1)
     np.testing.assert_array_equal(scene.contains(p, method="winding"), number.round() == 1)
 
@@ -143,6 +147,9 @@ def test_an_open_surface():
     v, f = ball(4)
     half = f[(v[f][:, :, 2] >= -1e-9).all(1)]
     scene = ropewalk.Scene(v, half)
+    p = rng.uniform(-1, 1, (3000, 3))
+    inside = scene.winding_number(p, accuracy=0) > 0.5
+    np.testing.assert_array_equal(scene.contains(p, method="winding"), inside)
     assert abs(scene.winding_number([0, 0, 0]) - 0.5) < 1e-3
     assert scene.contains([[0, 0, 0.3], [0, 0, -0.3]], method="winding").tolist() == [True, False]
 
@@ -200,6 +207,13 @@ def test_bad_arguments(query):
     refused(ropewalk.ArgumentError, "threads", None, "0 to", lambda: ask(CUBE, [0, 0, 0], threads=-1))
     balls = ropewalk.load("spd:balls:1")
     refused(ropewalk.ArgumentError, "scene", None, "triangles only", lambda: ask(balls, [0, 0, 0]))
+
+
+@pytest.mark.parametrize("accuracy", [-1, np.nan, [0.1, 0.2]])
+def test_accuracies_that_are_none(accuracy):
+    ask = lambda: CUBE.winding_number([0, 0, 0], accuracy=accuracy)  # noqa: E731
+    refused(ropewalk.ArgumentError, "accuracy", None, "0 or more", ask)
+    refused(ropewalk.ArgumentTypeError, "accuracy", None, "expected", lambda: CUBE.winding_number([0, 0, 0], accuracy="x"))
 
 
 def test_a_method_that_is_none():

@@ -4,10 +4,15 @@ use crate::core::{Core, zeros};
 use crate::{error, work};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
-use ropewalk::point::{Cell, PointError, PointQueries, is_near};
+use ropewalk::point::{Cell, PointError, PointQueries, WindingMoments, is_near};
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
 
 /// Points of a task: some tenths of a second at most, so that Ctrl-C is heard.
 const BLOCK: usize = 1 << 15;
+
+/// The same where a point may take a tenth of a millisecond.
+const SLOW_BLOCK: usize = 1 << 11;
 
 /// The fewest points of a task where several threads share a batch.
 const MIN_BLOCK: usize = 512;
@@ -22,6 +27,8 @@ const FULL_TASK: usize = 1 << 22;
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
 pub struct Points {
     core: Py<Core>,
+    /// Made when first needed.
+    moments: OnceLock<WindingMoments>,
 }
 
 /// Distances, primitives, meshes, nearest points and surface coordinates.
@@ -43,7 +50,7 @@ impl Points {
     #[new]
     fn new(core: Py<Core>) -> PyResult<Points> {
         queries(core.get())?;
-        Ok(Points { core })
+        Ok(Points { core, moments: OnceLock::new() })
     }
 
     /// How many points have no answer, and the first of them.
@@ -111,25 +118,43 @@ impl Points {
         })
     }
 
-    /// Inside or on a closed surface.
+    /// Inside or on a closed surface by parity, or inside of any by winding numbers.
     fn contains<'py>(
         &self,
         py: Python<'py>,
         points: PyReadonlyArray1<'py, f64>,
+        winding: bool,
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        if winding {
+            let moments = self.moments(py, threads)?;
+            return self.each(py, &points, threads, SLOW_BLOCK, |queries, points, out| {
+                if let Ok(found) = queries.contains_by_winding(moments, points) {
+                    out.copy_from_slice(&found);
+                }
+            });
+        }
         self.each(py, &points, threads, BLOCK, |queries, points, out| {
             out.copy_from_slice(&queries.contains(points));
         })
     }
 
-    /// Generalised winding numbers.
+    /// Generalised winding numbers, off by `accuracy` at most; 0 is the sum over all triangles.
     fn winding_number<'py>(
         &self,
         py: Python<'py>,
         points: PyReadonlyArray1<'py, f64>,
+        accuracy: f64,
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        if accuracy > 0.0 {
+            let moments = self.moments(py, threads)?;
+            return self.each(py, &points, threads, SLOW_BLOCK, |queries, points, out| {
+                if let Ok(found) = queries.winding_number_within(moments, points, accuracy) {
+                    out.copy_from_slice(&found);
+                }
+            });
+        }
         let triangles = self.core.get().geometry.len().max(1);
         let most = (FULL_TASK / triangles).clamp(1, BLOCK);
         self.each(py, &points, threads, most, |queries, points, out| {
@@ -188,6 +213,22 @@ impl Points {
 }
 
 impl Points {
+    /// The moments of the scene's triangles.
+    fn moments(&self, py: Python<'_>, threads: usize) -> PyResult<&WindingMoments> {
+        if self.moments.get().is_none() {
+            let queries = queries(self.core.get())?;
+            let made = if threads == 1 {
+                py.detach(|| queries.winding_moments())
+            } else {
+                let (stop, queries) = (AtomicBool::new(false), queries.with_threads(0));
+                work::watch(py, threads, &stop, |_| Ok(()), || queries.winding_moments())?
+            };
+            // Two threads may make them at once; they are the same.
+            let _ = self.moments.set(made);
+        }
+        self.moments.get().ok_or_else(|| error::other("moments are missing".into()))
+    }
+
     /// One number a point.
     fn each<'py, T: numpy::Element + bytemuck::Zeroable + Clone + Send>(
         &self,
