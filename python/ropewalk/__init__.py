@@ -28,6 +28,7 @@ from ._errors import (
     SceneReadError,
 )
 from ._hits import HitLists, Hits
+from ._mesh import read_mesh
 from ._points import Cells, ClosestPoints
 from ._report import Report
 from ._ropewalk import default_threads, simd_level
@@ -57,5 +58,6 @@ __all__ = [
     "SceneReadError",
     "default_threads",
     "load",
+    "read_mesh",
     "simd_level",
 ]

@@ -1,4 +1,4 @@
-"""The extension module. Everything in it but the two functions is private to the package."""
+"""The extension module. Everything in it but the first two functions is private to the package."""
 
 from collections.abc import Callable
 from typing import Literal, final
@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 def simd_level() -> Literal["scalar", "avx2", "avx512"]: ...
 def default_threads() -> int: ...
+
+def read_mesh(path: str) -> tuple[NDArray[np.float64], NDArray[np.uint32]] | None: ...
 
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import _ropewalk
 from ._arrays import (
     ArrayLike,
     as_array,
@@ -30,6 +31,7 @@ from ._errors import (
     PrecisionWarning,
 )
 from ._hits import HitLists, Hits, make_hits, make_lists
+from ._mesh import as_path
 from ._points import PointMethods
 from ._report import Report, plural, report_of, size_of
 from ._ropewalk import Core, Rays, default_threads
@@ -514,28 +516,26 @@ def load(
     threads: int = 0,
     progress: bool | Callable[[float], object] | None = None,
 ) -> Scene:
-    """Loads a scene: an NFF file, gzipped or not, or a built-in one, ``"spd:NAME"`` or
-    ``"spd:NAME:SIZE"`` of the Standard Procedural Databases (Haines 1987).
+    """Loads a scene: a mesh file as :func:`read_mesh` reads it (OBJ, PLY, STL, OFF, glTF), an NFF file,
+    both gzipped or not, or a built-in scene, ``"spd:NAME"`` or ``"spd:NAME:SIZE"`` of the Standard
+    Procedural Databases (Haines 1987).
 
-    Object ``i`` of the file is primitive ``i`` of one mesh, hit on both sides; polygons, spheres,
-    cones and patches stay what they are. Coordinates are rounded to float32. The other arguments are
-    those of :class:`Scene`.
+    Triangle or object ``i`` of the file is primitive ``i`` of one mesh, hit on both sides; polygons,
+    spheres, cones and patches of NFF stay what they are. Coordinates are rounded to float32. The other
+    arguments are those of :class:`Scene`.
 
     Raises:
         SceneNotFoundError: the file cannot be opened.
-        SceneFileError: its content is wrong; the message has line and column.
+        SceneFileError: its content is wrong; the message says where.
 
     >>> import ropewalk
     >>> ropewalk.load("spd:balls:2")
     <ropewalk.Scene of 92 primitives in 1 mesh, box (-12, -12, -0.5) to (12, 12, 0.785072), tree 6.4 KiB>
     """
-    try:
-        name = os.fsdecode(path)
-        name.encode()
-    except (TypeError, UnicodeError) as error:
-        raise ArgumentTypeError(
-            f"path: expected a path that is valid Unicode, found {path!r} ({error})", "path"
-        ) from None
+    name = as_path(path)
+    mesh = _ropewalk.read_mesh(name)
+    if mesh is not None:
+        return Scene(*mesh, preset=preset, threads=threads, progress=progress)
     with _progress(progress) as show:
         core = Core.load(name, _preset(preset), _threads(threads), show)
     scene = Scene.__new__(Scene)

@@ -9,6 +9,7 @@
 
 mod core;
 mod error;
+mod mesh;
 mod points;
 mod rays;
 mod state;
@@ -24,6 +25,8 @@ mod _ropewalk {
 
     #[pymodule_export]
     use crate::core::Core;
+    #[pymodule_export]
+    use crate::mesh::read_mesh;
     #[pymodule_export]
     use crate::points::Points;
     #[pymodule_export]

@@ -15,7 +15,7 @@ use std::time::Instant;
 /// Arguments of `bench`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .nff or .nff.gz file, or a built-in scene such as spd:balls:4
+    /// A .nff, .obj, .ply, .stl, .off, .gltf or .glb file, also gzipped, or a built-in scene such as spd:balls:4
     scene: String,
     /// Workloads, comma-separated; an unknown name lists them all
     #[arg(
