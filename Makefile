@@ -50,7 +50,7 @@ python: tools ## Install the Python package into a fresh virtual environment and
 	@echo "==> the Python package"
 	@scripts/test-python
 
-fuzz: tools ## Fuzz the NFF reader for FUZZ_SECONDS (needs a nightly toolchain)
+fuzz: tools ## Fuzz each reader for FUZZ_SECONDS (needs a nightly toolchain)
 	@scripts/fuzz $(FUZZ_SECONDS)
 
 bench: tools ## Rays per second against Embree and other peers, recorded under bench/record

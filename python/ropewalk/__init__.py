@@ -1,4 +1,4 @@
-"""Ray casting on kd-trees: closest, any, all and first hits from NumPy arrays.
+"""Ray casting on kd-trees: closest, any, all and first hits, and points, from NumPy arrays.
 
 >>> import numpy as np, ropewalk
 >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -16,6 +16,8 @@ from ._errors import (
     ArgumentError,
     ArgumentTypeError,
     InternalError,
+    InvalidPointError,
+    InvalidPointWarning,
     InvalidRayError,
     InvalidRayWarning,
     OtherGeometryError,
@@ -28,6 +30,8 @@ from ._errors import (
     SceneWriteError,
 )
 from ._hits import HitLists, Hits
+from ._mesh import read_mesh
+from ._points import Cells, ClosestPoints
 from ._report import Report
 from ._ropewalk import default_threads, simd_level
 from ._scene import Scene, load
@@ -38,10 +42,14 @@ __version__ = _version("ropewalk")
 __all__ = [
     "ArgumentError",
     "ArgumentTypeError",
+    "Cells",
+    "ClosestPoints",
     "Events",
     "HitLists",
     "Hits",
     "InternalError",
+    "InvalidPointError",
+    "InvalidPointWarning",
     "InvalidRayError",
     "InvalidRayWarning",
     "OtherGeometryError",
@@ -57,5 +65,6 @@ __all__ = [
     "Walker",
     "default_threads",
     "load",
+    "read_mesh",
     "simd_level",
 ]

@@ -7,6 +7,10 @@ from typing import Any
 import numpy as np
 
 from ._errors import ArgumentError, ArgumentTypeError
+from ._ropewalk import default_threads
+
+#: The most threads that can be asked for.
+MAX_THREADS = 1024
 
 #: Any numeric array: NumPy's, nested sequences, or what has DLPack, the array interface or the
 #: buffer protocol (torch CPU tensors do).
@@ -87,6 +91,11 @@ def as_integer(value: Any, argument: str, low: int, high: int) -> int:
     if not low <= number <= high:
         raise ArgumentError(f"{argument}: expected {low} to {high}, found {number}", argument)
     return int(number)
+
+
+def as_threads(value: Any) -> int:
+    """A number of threads; 0 is as many as this process may run on."""
+    return as_integer(value, "threads", 0, MAX_THREADS) or default_threads()
 
 
 def as_faces(value: ArrayLike, argument: str, vertices: int) -> np.ndarray:

@@ -37,6 +37,10 @@ class InvalidRayError(ArgumentError):
     """With ``strict=True``: a ray that can hit nothing whatever the scene."""
 
 
+class InvalidPointError(ArgumentError):
+    """With ``strict=True``: a point that is NaN, infinite or beyond 1e100."""
+
+
 class OutOfMemoryError(RopewalkError, MemoryError):
     """A tree or a result does not fit into memory or into its indices."""
 
@@ -67,6 +71,10 @@ class InternalError(RopewalkError, RuntimeError):
 
 class InvalidRayWarning(UserWarning):
     """Some rays are NaN, infinite or without direction; they were counted and miss."""
+
+
+class InvalidPointWarning(UserWarning):
+    """Some points are NaN, infinite or beyond 1e100; they were counted and have no answer."""
 
 
 class PrecisionWarning(UserWarning):

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import _ropewalk
 from ._arrays import (
     ArrayLike,
     as_array,
@@ -20,6 +21,7 @@ from ._arrays import (
     as_masks,
     as_points,
     as_rows,
+    as_threads,
     per_ray,
 )
 from ._errors import (
@@ -31,6 +33,8 @@ from ._errors import (
 )
 from ._file import Saved
 from ._hits import HitLists, Hits, make_hits, make_lists
+from ._mesh import as_path
+from ._points import PointMethods
 from ._report import Report, plural, report_of, size_of
 from ._ropewalk import Core, DoubleCore, DoubleRays, Rays, default_threads
 
@@ -42,9 +46,6 @@ if TYPE_CHECKING:
 #: Up to so many rays are answered on the calling thread: waking others would take longer.
 _FEW_RAYS = 2048
 
-#: The most threads that can be asked for.
-_MAX_THREADS = 1024
-
 #: Rounding by more than this share of the box's diagonal is warned of: 2^-25 is what rounding to
 #: float32 costs an object around the origin, this is an object 32 times its size away.
 _PRECISION = 2.0**-20
@@ -55,7 +56,7 @@ _ALL_BITS = 0xFFFF_FFFF
 _LARGEST = 1e100
 
 
-class Scene(Saved):
+class Scene(Saved, PointMethods):
     """Triangles that rays can be cast at. A scene never changes and can be used by many threads.
 
     Args:
@@ -86,7 +87,7 @@ class Scene(Saved):
     1.0
     """
 
-    __slots__ = ("__weakref__", "_core", "_placed", "_report", "_starts")
+    __slots__ = ("__weakref__", "_core", "_placed", "_points", "_report", "_starts")
 
     _core: Core | DoubleCore
 
@@ -229,6 +230,7 @@ class Scene(Saved):
 
     def _adopt(self, core: Core | DoubleCore) -> None:
         self._core = core
+        self._points = None
         self._starts = np.asarray(core.starts, np.int64)
         self._report: Report | None = None
         # Scenes and matrices that instances were made of.
@@ -628,28 +630,26 @@ def load(
     threads: int = 0,
     progress: bool | Callable[[float], object] | None = None,
 ) -> Scene:
-    """Loads a scene: an NFF file, gzipped or not, or a built-in one, ``"spd:NAME"`` or
-    ``"spd:NAME:SIZE"`` of the Standard Procedural Databases (Haines 1987).
+    """Loads a scene: a mesh file as :func:`read_mesh` reads it (OBJ, PLY, STL, OFF, glTF), an NFF file,
+    both gzipped or not, or a built-in scene, ``"spd:NAME"`` or ``"spd:NAME:SIZE"`` of the Standard
+    Procedural Databases (Haines 1987).
 
-    Object ``i`` of the file is primitive ``i`` of one mesh, hit on both sides; polygons, spheres,
-    cones and patches stay what they are. Coordinates are rounded to float32. The other arguments are
-    those of :class:`Scene`.
+    Triangle or object ``i`` of the file is primitive ``i`` of one mesh, hit on both sides; polygons,
+    spheres, cones and patches of NFF stay what they are. Coordinates are rounded to float32. The other
+    arguments are those of :class:`Scene`.
 
     Raises:
         SceneNotFoundError: the file cannot be opened.
-        SceneFileError: its content is wrong; the message has line and column.
+        SceneFileError: its content is wrong; the message says where.
 
     >>> import ropewalk
     >>> ropewalk.load("spd:balls:2")
     <ropewalk.Scene of 92 primitives in 1 mesh, box (-12, -12, -0.5) to (12, 12, 0.785072), tree 6.4 KiB>
     """
-    try:
-        name = os.fsdecode(path)
-        name.encode()
-    except (TypeError, UnicodeError) as error:
-        raise ArgumentTypeError(
-            f"path: expected a path that is valid Unicode, found {path!r} ({error})", "path"
-        ) from None
+    name = as_path(path)
+    mesh = _ropewalk.read_mesh(name)
+    if mesh is not None:
+        return Scene(*mesh, preset=preset, threads=threads, progress=progress)
     with _progress(progress) as show:
         core = Core.load(name, _preset(preset), check_threads(threads), show)
     scene = Scene.__new__(Scene)
@@ -778,6 +778,8 @@ def _cells(start: Any, shape: tuple[int, ...]) -> NDArray[np.int64] | None:
 
 def check_threads(threads: int) -> int:
     return as_integer(threads, "threads", 0, _MAX_THREADS) or default_threads()
+def _threads(threads: int) -> int:
+    return as_threads(threads)
 
 
 def _mesh(

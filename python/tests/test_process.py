@@ -217,6 +217,20 @@ def test_ctrl_c_stops_a_query(query, threads):
     assert hits == "9"
 
 
+@posix
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("query", ["closest_point", "winding_number", "contains"])
+def test_ctrl_c_stops_a_query_about_points(query, threads):
+    late, near = python(INTERRUPTED.format(
+        triangles=2000,
+        prepare="scene = ropewalk.Scene(v, f); p = np.random.default_rng(1).normal(size=(10**6, 3))",
+        work=f"scene.{query}(p, threads={threads})",
+        after="print((scene.distance(v[f[:9]].mean(1)) < 1e-6).sum())",
+    ))
+    assert float(late) < 5
+    assert near == "9"
+
+
 def test_progress_is_reported():
     shares = []
     ropewalk.Scene(*random_mesh(rng, 60_000, 1.0), preset="best", progress=shares.append)

@@ -76,7 +76,10 @@ def test_everything_public_is_exported_and_documented():
     assert pathlib.Path(ropewalk.__file__).with_name("py.typed").exists()
 
 
-@pytest.mark.parametrize("module", ["ropewalk", "ropewalk._scene", "ropewalk._hits", "ropewalk._report"])
+MODULES = ["ropewalk", "ropewalk._mesh", "ropewalk._scene", "ropewalk._hits", "ropewalk._points", "ropewalk._report"]
+
+
+@pytest.mark.parametrize("module", MODULES)
 def test_examples(module):
     result = doctest.testmod(importlib.import_module(module))
     assert result.attempted > 0 and result.failed == 0
@@ -95,7 +98,19 @@ def test_code_of_the_pages(page):
         exec(compile(block, page, "exec"), names)
 
 
-@pytest.mark.parametrize("query", ["closest_hit", "occluded", "all_hits", "first_hits", "count_hits"])
+RAY_QUERIES = ["closest_hit", "occluded", "all_hits", "first_hits", "count_hits"]
+POINT_QUERIES = [
+    "closest_point",
+    "distance",
+    "signed_distance",
+    "contains",
+    "winding_number",
+    "locate",
+    "cells",
+]
+
+
+@pytest.mark.parametrize("query", RAY_QUERIES + POINT_QUERIES)
 def test_queries_have_an_example(query):
     assert ">>>" in getattr(ropewalk.Scene, query).__doc__
 

@@ -7,7 +7,7 @@ use ropewalk::build::{self, BuildError, BuildReport, BuildSettings, Preset, Term
 use ropewalk::method::Method;
 use ropewalk::wide::WideTree;
 use ropewalk::{Accelerator, Geometry};
-use ropewalk_scene::{FacetPolicy, NffLimits, Scene, load_scene};
+use ropewalk_scene::{FacetPolicy, Loaded as Source, NffLimits, Scene};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
@@ -27,8 +27,12 @@ pub fn load(spec: &str) -> anyhow::Result<Loaded> {
 /// The same with a facet policy; `None` is the rule of the databases.
 pub fn load_as(spec: &str, policy: Option<FacetPolicy>) -> anyhow::Result<Loaded> {
     let start = Instant::now();
-    let scene = load_scene(spec, &NffLimits::default())?;
-    let policy = policy.unwrap_or_else(|| facet_policy(&scene));
+    let source = ropewalk_scene::load(spec, &NffLimits::default())?;
+    let is_mesh = matches!(source, Source::Mesh(..));
+    let scene = source.into_scene();
+    // Which way the triangles of a mesh turn is not known.
+    let rule = || if is_mesh { FacetPolicy::TwoSided } else { facet_policy(&scene) };
+    let policy = policy.unwrap_or_else(rule);
     let geometry = scene.geometry(policy).with_context(|| spec.to_owned())?;
     Ok(Loaded { scene, geometry: Arc::new(geometry), seconds: start.elapsed().as_secs_f64() })
 }

@@ -327,3 +327,27 @@ fn a_file_that_is_no_saved_scene_is_refused_in_a_sentence() {
     assert!(refused(&["build", "spd:tetra:2", "--save", "no/b"], 1).contains("cannot save no/b: "));
     assert_eq!(files(folder.path()), ["a.nff", "a.rope"]);
 }
+
+/// Mesh files are read wherever scenes are, and hit from both sides.
+#[test]
+fn mesh_files_are_rendered_and_timed() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n";
+    std::fs::write(folder.path().join("four.obj"), text).unwrap();
+    let args = ["render", "four.obj", "--size", "40x30", "-o", "a.png", "--json"];
+    let output = ropewalk(folder.path(), &args);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert!(json["rays"]["primary_hits"].as_u64().unwrap() > 100, "{json}");
+    let args = ["bench", "four.obj", "--side", "16", "--rounds", "1", "--json"];
+    let output = ropewalk(folder.path(), &args);
+    assert!(output.status.success(), "{}", stderr(&output));
+    std::fs::write(folder.path().join("cut.obj"), "v 0 0 0\nf 1 2").unwrap();
+    let output = ropewalk(folder.path(), &["stats", "cut.obj"]);
+    assert!(!output.status.success());
+    let message = stderr(&output);
+    assert!(
+        message.contains("cut.obj: line 2: expected a face of at least 3 corners"),
+        "{message}"
+    );
+}

@@ -12,6 +12,8 @@ mod double;
 mod error;
 mod figures;
 mod file;
+mod mesh;
+mod points;
 mod rays;
 mod state;
 mod surface;
@@ -31,6 +33,10 @@ mod _ropewalk {
     use crate::double::{DoubleCore, DoubleRays};
     #[pymodule_export]
     use crate::file::{open, save};
+    #[pymodule_export]
+    use crate::mesh::read_mesh;
+    #[pymodule_export]
+    use crate::points::Points;
     #[pymodule_export]
     use crate::rays::Rays;
     #[pymodule_export]

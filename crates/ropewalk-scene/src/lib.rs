@@ -1,5 +1,5 @@
-//! Scenes: a neutral scene model, the NFF reader and writer, and generators of the Standard
-//! Procedural Databases.
+//! Scenes: a neutral scene model, the NFF reader and writer, readers of triangle meshes, and generators of
+//! the Standard Procedural Databases.
 //!
 //! Readers and generators speak to a [`SceneSink`], so that a scene can be held ([`Scene`]),
 //! written to a file as it is made, or merely counted.
@@ -8,6 +8,7 @@
 
 mod file;
 mod geometry;
+pub mod mesh;
 mod model;
 pub mod nff;
 mod sink;
@@ -15,7 +16,8 @@ mod source;
 pub mod spd;
 
 pub use file::write_atomically;
+pub use mesh::{Mesh, MeshError, MeshFormat, MeshLimits};
 pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, SceneSink, Surface};
 pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};
 pub use nff::{format_g, read_nff};
-pub use source::{Fault, SceneError, load_scene, parse_builtin};
+pub use source::{Fault, Loaded, SceneError, load, load_scene, parse_builtin};

@@ -1,6 +1,7 @@
 //! Scenes by name: files, compressed or not, and built-in scenes.
 
-use crate::model::Scene;
+use crate::mesh::{Mesh, MeshError, MeshErrorKind, MeshFormat, MeshLimits};
+use crate::model::{Material, Object, Scene, Surface};
 use crate::nff::{NffError, NffLimits};
 use crate::spd::{self, Spd, SpdError};
 use flate2::bufread::MultiGzDecoder;
@@ -42,6 +43,9 @@ pub enum SceneError {
     /// The text is at fault.
     #[error(transparent)]
     Nff(#[from] NffError),
+    /// A mesh file is at fault.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
     /// There is no built-in scene of that name.
     #[error("{spec}: expected a built-in scene ({}), found \"{name}\"", builtin_names())]
     UnknownBuiltin {
@@ -96,6 +100,10 @@ impl SceneError {
                 NffErrorKind::Io(error) if !is_damaged_archive(error) => Fault::System,
                 _ => Fault::Input,
             },
+            SceneError::Mesh(error) => match &error.kind {
+                MeshErrorKind::Io(error) if !is_damaged_archive(error) => Fault::System,
+                _ => Fault::Input,
+            },
             SceneError::NotGzip { .. } => Fault::Input,
             SceneError::Directory { .. }
             | SceneError::UnknownBuiltin { .. }
@@ -124,17 +132,68 @@ fn builtin_names() -> String {
     Spd::ALL.map(Spd::name).join(", ")
 }
 
-/// Loads a scene: `spd:NAME[:SIZE]` is a built-in one, anything else the path of an NFF file, which
-/// may be compressed by gzip whatever its name. The scene's name becomes the file's name without
-/// its extensions, or `spd:NAME:SIZE`.
+/// What a file holds.
+#[derive(Clone, Debug)]
+pub enum Loaded {
+    /// A scene with materials, lights and a view.
+    Scene(Scene),
+    /// Triangles and nothing else, under the file's name.
+    Mesh(String, Mesh),
+}
+
+impl Loaded {
+    /// The scene; triangles of a mesh become its objects, in their order, matte white.
+    pub fn into_scene(self) -> Scene {
+        match self {
+            Loaded::Scene(scene) => scene,
+            Loaded::Mesh(name, Mesh { vertices, faces }) => {
+                let corners = |face: [u32; 3]| face.map(|i| vertices[i as usize]).to_vec();
+                let object =
+                    |face| Object { surface: Surface::Polygon(corners(face)), material: 0 };
+                let objects = faces.into_iter().map(object).collect();
+                Scene { name, materials: vec![Material::default()], objects, ..Scene::default() }
+            }
+        }
+    }
+}
+
+/// Loads a scene or a mesh: `spd:NAME[:SIZE]` is a built-in scene, a path whose name has the extension of a
+/// [`MeshFormat`] a mesh, any other path an NFF file. Files may be compressed by gzip whatever their names. A scene's
+/// name becomes the file's name without its extensions, or `spd:NAME:SIZE`.
 ///
 /// # Errors
-/// [`SceneError`]; errors in a file carry its name, line and column.
-pub fn load_scene(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
-    match parse_builtin(spec)? {
-        Some((spd, size)) => load_builtin(spec, spd, size, limits),
-        None => load_file(spec, limits),
+/// [`SceneError`]; errors in a file carry its name and the place in it.
+pub fn load(spec: &str, limits: &NffLimits) -> Result<Loaded, SceneError> {
+    if let Some((spd, size)) = parse_builtin(spec)? {
+        return load_builtin(spec, spd, size, limits).map(Loaded::Scene);
     }
+    match MeshFormat::of_name(Path::new(spec)) {
+        Some(format) => load_mesh(spec, format),
+        None => load_file(spec, limits).map(Loaded::Scene),
+    }
+}
+
+/// [`load`] as a scene, whatever it is.
+///
+/// # Errors
+/// Those of [`load`].
+pub fn load_scene(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
+    load(spec, limits).map(Loaded::into_scene)
+}
+
+fn load_mesh(spec: &str, format: MeshFormat) -> Result<Loaded, SceneError> {
+    let path = Path::new(spec);
+    if path.is_dir() {
+        return Err(SceneError::Directory { path: spec.to_owned() });
+    }
+    let cannot_open = |source| SceneError::Open { path: spec.to_owned(), source };
+    let bytes = std::fs::read(path).map_err(cannot_open)?;
+    let named_gzip = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    if named_gzip && !bytes.starts_with(&GZIP_MAGIC) {
+        return Err(SceneError::NotGzip { path: spec.to_owned() });
+    }
+    let mesh = Mesh::parse(format, &bytes, path.parent(), &MeshLimits::DEFAULT);
+    Ok(Loaded::Mesh(stem(path), mesh.map_err(|error| error.in_file(spec))?))
 }
 
 /// The database and size that `spd:NAME[:SIZE]` names, the standard size if none is given; `None`
@@ -201,9 +260,14 @@ fn load_file(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
     Ok(scene)
 }
 
-/// The file's name without `.gz` and without the extension before it.
+/// The file's name without `.gz` and without the extension before it, if it is a known one.
 fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
-    name.strip_suffix(".nff").unwrap_or(name).to_owned()
+    let known =
+        |extension: &str| extension == "nff" || MeshFormat::of_name(Path::new(name)).is_some();
+    match name.rsplit_once('.') {
+        Some((stem, extension)) if known(extension) => stem.to_owned(),
+        _ => name.to_owned(),
+    }
 }

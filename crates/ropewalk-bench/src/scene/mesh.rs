@@ -1,10 +1,8 @@
-//! A triangle mesh with a view, and its reader for PLY and GLB files, gzipped or plain.
+//! A triangle mesh with a view.
 
-use super::{glb, ply};
 use crate::workload::{Surface, View, triangle_normal};
-use flate2::read::GzDecoder;
 use ropewalk::{Aabb, Ray};
-use std::io::Read;
+use ropewalk_scene::MeshLimits;
 use std::path::Path;
 
 /// An indexed triangle mesh. Every face refers to existing vertices and every vertex is finite;
@@ -28,42 +26,18 @@ pub struct Scene {
     pub view: View,
 }
 
-/// Vertices and faces as a file states them.
-pub(super) type Parts = (Vec<[f32; 3]>, Vec<[u32; 3]>);
-
 /// Why a mesh could not be read.
 pub type MeshError = anyhow::Error;
 
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
-const GLB_MAGIC: &[u8; 4] = b"glTF";
-
 impl Mesh {
-    /// Reads a PLY (ascii or binary little-endian) or GLB file; gzip is recognised by its magic.
+    /// Reads a mesh file of a format that its name tells; see [`ropewalk_scene::Mesh::read`].
     ///
     /// # Errors
-    /// Says what was found where: I/O, an unknown format, a malformed file, an index out of range
-    /// or a vertex that is not finite.
+    /// Says what was expected where, and what was found.
     pub fn read(name: &str, path: &Path) -> Result<Mesh, MeshError> {
-        let bytes = std::fs::read(path)
-            .map_err(|e| anyhow::anyhow!("{}: cannot be read: {e}", path.display()))?;
-        Mesh::parse(name, &bytes).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))
-    }
-
-    /// As [`Mesh::read`], from memory.
-    ///
-    /// # Errors
-    /// See [`Mesh::read`].
-    pub fn parse(name: &str, bytes: &[u8]) -> Result<Mesh, MeshError> {
-        let mut plain = Vec::new();
-        let bytes = if bytes.starts_with(&GZIP_MAGIC) {
-            GzDecoder::new(bytes).read_to_end(&mut plain)?;
-            &plain[..]
-        } else {
-            bytes
-        };
-        let (vertices, faces) =
-            if bytes.starts_with(GLB_MAGIC) { glb::parse(bytes)? } else { ply::parse(bytes)? };
-        Mesh { name: name.to_owned(), vertices, faces }.checked()
+        let read = ropewalk_scene::Mesh::read(path, &MeshLimits::DEFAULT)?;
+        let vertices = read.vertices.into_iter().map(|v| v.map(|x| x as f32)).collect();
+        Mesh { name: name.to_owned(), vertices, faces: read.faces }.checked()
     }
 
     /// The mesh itself, if its indices and vertices are sound.
@@ -139,69 +113,17 @@ fn place(vertex: &[f32; 3]) -> [u32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flate2::{Compression, write::GzEncoder};
-    use std::io::Write;
-
-    const ASCII: &str = "ply\nformat ascii 1.0\ncomment x\nelement vertex 4\nproperty float x\n\
-        property float y\nproperty float z\nproperty float confidence\nelement face 2\n\
-        property list uchar int vertex_indices\nend_header\n0 0 0 1\n1 0 0 1\n1 1 0 1\n0 1 0.5 1\n\
-        3 0 1 2\n4 0 1 2 3\n";
-
-    #[test]
-    fn ascii_ply_skips_other_properties_and_fans_polygons() {
-        let m = Mesh::parse("a", ASCII.as_bytes()).unwrap();
-        assert_eq!(m.vertices[3], [0.0, 1.0, 0.5]);
-        assert_eq!(m.faces, [[0, 1, 2], [0, 1, 2], [0, 2, 3]]);
-    }
-
-    #[test]
-    fn binary_ply_equals_ascii_ply_and_gzip_changes_nothing() {
-        let mut bytes = ASCII.split_inclusive("end_header\n").next().unwrap().to_owned();
-        bytes = bytes.replace("ascii", "binary_little_endian");
-        let mut bytes = bytes.into_bytes();
-        for v in [[0f32, 0., 0., 1.], [1., 0., 0., 1.], [1., 1., 0., 1.], [0., 1., 0.5, 1.]] {
-            bytes.extend(v.iter().flat_map(|x| x.to_le_bytes()));
-        }
-        for f in [&[0i32, 1, 2][..], &[0, 1, 2, 3]] {
-            bytes.push(f.len() as u8);
-            bytes.extend(f.iter().flat_map(|x| x.to_le_bytes()));
-        }
-        let ascii = Mesh::parse("a", ASCII.as_bytes()).unwrap();
-        assert_eq!(Mesh::parse("a", &bytes).unwrap(), ascii);
-        let mut gz = GzEncoder::new(Vec::new(), Compression::fast());
-        gz.write_all(&bytes).unwrap();
-        assert_eq!(Mesh::parse("a", &gz.finish().unwrap()).unwrap(), ascii);
-        assert!(Mesh::parse("a", &bytes[..bytes.len() - 1]).is_err());
-    }
-
-    #[test]
-    fn glb_reads_positions_and_indices() {
-        let json = r#"{"accessors":[
-            {"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
-            {"bufferView":1,"componentType":5123,"count":3,"type":"SCALAR"}],
-            "bufferViews":[{"byteLength":36},{"byteOffset":36,"byteLength":6}],
-            "meshes":[{"primitives":[{"indices":1,"attributes":{"POSITION":0}}]}],
-            "nodes":[{"mesh":0}]}"#;
-        let mut bin: Vec<u8> =
-            [0f32, 0., 0., 1., 0., 0., 0., 1., 0.].iter().flat_map(|x| x.to_le_bytes()).collect();
-        bin.extend([0u16, 1, 2].iter().flat_map(|x| x.to_le_bytes()));
-        let mut bytes = b"glTF".to_vec();
-        bytes.extend(2u32.to_le_bytes());
-        bytes.extend(((12 + 16 + json.len() + bin.len()) as u32).to_le_bytes());
-        for (kind, chunk) in [(*b"JSON", json.as_bytes()), (*b"BIN\0", &bin)] {
-            bytes.extend((chunk.len() as u32).to_le_bytes());
-            bytes.extend(kind);
-            bytes.extend(chunk);
-        }
-        let m = Mesh::parse("g", &bytes).unwrap();
-        assert_eq!((m.vertices[1], &m.faces[..]), ([1.0, 0.0, 0.0], &[[0, 1, 2]][..]));
-        assert!(Mesh::parse("g", &bytes[..bytes.len() - 1]).is_err());
-    }
 
     #[test]
     fn unsound_meshes_are_refused() {
-        for (from, to) in [("3 0 1 2", "3 0 1 9"), ("0 1 0.5", "0 nan 0.5"), ("ply\n", "plx\n")] {
-            assert!(Mesh::parse("a", ASCII.replace(from, to).as_bytes()).is_err(), "{to}");
-        }
+        let sound = Mesh {
+            name: "a".into(),
+            vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            faces: vec![[0, 1, 2]],
+        };
+        assert!(sound.clone().checked().is_ok());
+        assert!(Mesh { faces: vec![[0, 1, 3]], ..sound.clone() }.checked().is_err());
+        assert!(Mesh { faces: vec![], ..sound.clone() }.checked().is_err());
+        assert!(Mesh { vertices: vec![[f32::NAN; 3]; 3], ..sound }.checked().is_err());
     }
 }

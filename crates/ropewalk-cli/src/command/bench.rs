@@ -16,7 +16,7 @@ use std::time::Instant;
 /// Arguments of `bench`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .nff or .nff.gz file, a built-in scene such as spd:balls:4, or a saved scene
+    /// A .nff, .obj, .ply, .stl, .off, .gltf or .glb file, also gzipped, a built-in scene such as spd:balls:4, or a saved scene
     scene: String,
     /// Workloads, comma-separated; an unknown name lists them all
     #[arg(

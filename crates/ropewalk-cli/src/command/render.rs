@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `render`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .nff or .nff.gz file, or a built-in scene such as spd:balls:4
+    /// A .nff, .obj, .ply, .stl, .off, .gltf or .glb file, also gzipped, or a built-in scene such as spd:balls:4
     scene: String,
     /// Picture to write: .png or .exr; SCENE.png in this folder if not given
     #[arg(short, long)]

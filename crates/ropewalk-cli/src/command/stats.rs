@@ -9,7 +9,7 @@ use serde::Serialize;
 /// Arguments of `stats`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .nff or .nff.gz file, or a built-in scene such as spd:balls:4
+    /// A .nff, .obj, .ply, .stl, .off, .gltf or .glb file, also gzipped, or a built-in scene such as spd:balls:4
     scene: String,
     /// How to build and walk; an unknown name lists them all
     #[arg(long, default_value = Method::DEFAULT)]

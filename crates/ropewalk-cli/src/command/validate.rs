@@ -8,7 +8,7 @@ use ropewalk::{Accelerator, Walk};
 /// Arguments of `validate`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .nff or .nff.gz file, or a built-in scene such as spd:balls:4
+    /// A .nff, .obj, .ply, .stl, .off, .gltf or .glb file, also gzipped, or a built-in scene such as spd:balls:4
     scene: String,
     /// Check only this method's tree; all of them if not given
     #[arg(long)]

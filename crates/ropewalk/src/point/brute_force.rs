@@ -72,10 +72,10 @@ impl<'a> PointBruteForce<'a> {
 pub fn closest(geometry: &Geometry, point: [f64; 3], distance2: f64, prim_id: u32) -> ClosestPoint {
     let distance = distance2.sqrt();
     let Some(triangle) = geometry.triangle(prim_id) else {
-        return ClosestPoint { distance, prim_id, point: [f64::NAN; 3] };
+        return ClosestPoint { distance, prim_id, point: [f64::NAN; 3], uv: [f64::NAN; 2] };
     };
     let foot = nearest_foot(point, &triangle.vertices);
     let [a, b, c] = triangle.vertices.map(|v| v.map(f64::from));
     let on = |i: usize| a[i] + (foot.v * (b[i] - a[i]) + foot.w * (c[i] - a[i]));
-    ClosestPoint { distance, prim_id, point: std::array::from_fn(on) }
+    ClosestPoint { distance, prim_id, point: std::array::from_fn(on), uv: [foot.v, foot.w] }
 }

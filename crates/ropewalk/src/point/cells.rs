@@ -1,7 +1,7 @@
 //! Leaves by number: which one holds a point, and the box of each.
 
 use crate::aabb::Aabb;
-use crate::wide::{LEAF, LEVELS, WideTree, code_line};
+use crate::wide::{ID_MASK, LEAF, LEVELS, NO_ID, Treelet, WideTree, code_line};
 
 /// A leaf of one wide tree, empty ones included. It means nothing to other trees; asked about one that
 /// it does not belong to, they say so or name another leaf, and nothing worse happens.
@@ -100,4 +100,58 @@ pub fn cell_box(tree: &WideTree, cell: Cell) -> Option<Aabb> {
             return is_leaf(code).then_some(bounds);
         }
     }
+}
+
+/// All leaves in the order of their numbers.
+pub fn cells(tree: &WideTree) -> Vec<Cell> {
+    if is_leaf(tree.root()) {
+        return vec![Cell::ROOT];
+    }
+    let (mut cells, mut stack) = (Vec::new(), vec![tree.root()]);
+    while let Some(code) = stack.pop() {
+        let line = code_line(code);
+        let treelet = tree.lines().treelet(line);
+        // A leaf higher up fills the lowest child of its absent planes; the others are no cells.
+        for child in (0..CHILDREN as usize).rev() {
+            let code = treelet.child[child];
+            if !is_leaf(code) {
+                stack.push(code);
+            } else if is_cell(treelet, child) {
+                cells.push(Cell(line as u32 * CHILDREN + child as u32));
+            }
+        }
+    }
+    cells.sort_unstable();
+    cells
+}
+
+/// True if a child lies on the lower side of all planes on the way to it that are absent.
+fn is_cell(treelet: &Treelet, child: usize) -> bool {
+    let mut heap = 0;
+    for level in (0..LEVELS).rev() {
+        let upper = child >> level & 1;
+        if upper == 1 && treelet.plane[heap] == f32::INFINITY {
+            return false;
+        }
+        heap = 2 * heap + 1 + upper;
+    }
+    true
+}
+
+/// The primitives of a leaf, each once; none if the tree has no such leaf.
+pub fn cell_primitives(tree: &WideTree, cell: Cell) -> Vec<u32> {
+    let mut code = tree.root();
+    if cell_box(tree, cell).is_none() {
+        return Vec::new();
+    }
+    if !is_leaf(code) {
+        let treelet = tree.lines().treelet((cell.0 / CHILDREN) as usize);
+        code = treelet.child[(cell.0 % CHILDREN) as usize];
+    }
+    if code == 0 {
+        return Vec::new();
+    }
+    let blocks = tree.block_lines(code).map(|line| tree.lines().block(line));
+    let ids = blocks.flat_map(|block| block.id).filter(|id| id & ID_MASK != NO_ID);
+    ids.map(|id| id & ID_MASK).collect()
 }

@@ -17,6 +17,8 @@ pub use cells::Cell;
 pub use queries::{ClosestPoints, PointError, PointQueries};
 pub use side::Side;
 pub(crate) use side::{Crossing, crossing, flushed};
+pub use winding::WindingMoments;
+pub(crate) use winding::{Moments, NOTHING, half_angle, tangent};
 
 /// Largest coordinate of a point; beyond it products overflow.
 pub const LARGEST: f64 = 1e100;
@@ -36,4 +38,6 @@ pub struct ClosestPoint {
     pub prim_id: u32,
     /// The point of it.
     pub point: [f64; 3],
+    /// Weights of its vertices 1 and 2 at that point.
+    pub uv: [f64; 2],
 }

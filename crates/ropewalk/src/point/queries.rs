@@ -3,10 +3,10 @@
 use super::brute_force::{PointBruteForce, closest};
 use super::cells::{self, Cell};
 use super::order::along_curve;
-use super::{ClosestPoint, Side};
+use super::{ClosestPoint, Side, WindingMoments};
 use crate::aabb::Aabb;
 use crate::geometry::Geometry;
-use crate::kernel::point::{self, Found};
+use crate::kernel::point::{self, Found, Winding};
 use crate::kernel::{BatchEvents, Level, NoEvents};
 use crate::wide::WideTree;
 use rayon::prelude::*;
@@ -23,6 +23,11 @@ const SORTED: usize = 1 << 20;
 /// Points for which all triangles are gone through that one task answers.
 const FULL_TASK: usize = 4;
 
+/// Accuracies with which it is first asked whether a winding number is above .5.
+const COARSE: f64 = 0.45;
+/// See [`COARSE`].
+const FINE: f64 = 1e-3;
+
 /// The nearest triangles of a batch: one entry a point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClosestPoints {
@@ -32,6 +37,8 @@ pub struct ClosestPoints {
     pub prim_id: Vec<u32>,
     /// The nearest point of it; NaN without one.
     pub point: Vec<[f64; 3]>,
+    /// Weights of the triangle's vertices 1 and 2 at that point; NaN without one.
+    pub uv: Vec<[f64; 2]>,
 }
 
 /// Why points cannot be answered.
@@ -41,6 +48,9 @@ pub enum PointError {
     /// The geometry holds spheres, cones or polygons.
     #[error("points are answered over triangles only; the geometry holds other primitives too")]
     NotTriangles,
+    /// The moments are those of another tree.
+    #[error("the moments were taken of another tree")]
+    OtherTree,
 }
 
 /// Answers batches of points over a wide tree of triangles.
@@ -87,7 +97,12 @@ impl<'a> PointQueries<'a> {
 
     /// The nearest triangle of each point and the nearest point of it.
     pub fn closest_point(&self, points: &[[f64; 3]]) -> ClosestPoints {
-        let nothing = ClosestPoint { distance: f64::NAN, prim_id: u32::MAX, point: [f64::NAN; 3] };
+        let nothing = ClosestPoint {
+            distance: f64::NAN,
+            prim_id: u32::MAX,
+            point: [f64::NAN; 3],
+            uv: [f64::NAN; 2],
+        };
         let all = self.in_order(points, nothing, |points, answers| {
             let found = self.found(points);
             for ((point, found), answer) in points.iter().zip(found).zip(answers) {
@@ -101,6 +116,7 @@ impl<'a> PointQueries<'a> {
             distance: all.iter().map(|nearest| nearest.distance).collect(),
             prim_id: all.iter().map(|nearest| nearest.prim_id).collect(),
             point: all.iter().map(|nearest| nearest.point).collect(),
+            uv: all.iter().map(|nearest| nearest.uv).collect(),
         }
     }
 
@@ -155,6 +171,77 @@ impl<'a> PointQueries<'a> {
         numbers
     }
 
+    /// The moments of the tree's triangles, for [`PointQueries::winding_number_within`] and
+    /// [`PointQueries::contains_by_winding`].
+    pub fn winding_moments(&self) -> WindingMoments {
+        WindingMoments::new(self.tree, self.geometry, self.threads != 1)
+    }
+
+    /// [`PointQueries::winding_number`] up to `accuracy`: cells far away count by their moments, as many as
+    /// their error bounds allow (after Barill et al. 2018). The bound is proven (docs/numerics.md); it is mostly
+    /// missed by far. Below about `1e-6` no moments are used, and only rounding differs from the sum.
+    ///
+    /// # Errors
+    /// [`PointError::OtherTree`].
+    pub fn winding_number_within(
+        &self,
+        moments: &WindingMoments,
+        points: &[[f64; 3]],
+        accuracy: f64,
+    ) -> Result<Vec<f64>, PointError> {
+        let found = self.windings(moments, points, accuracy)?;
+        Ok(found.into_iter().map(|winding| winding.number).collect())
+    }
+
+    /// True where the winding number is above .5, for surfaces with holes. Decided as by
+    /// [`PointQueries::winding_number`]: a number that may be on either side within its error is computed again,
+    /// closer, and at last as the sum over all triangles.
+    ///
+    /// # Errors
+    /// [`PointError::OtherTree`].
+    pub fn contains_by_winding(
+        &self,
+        moments: &WindingMoments,
+        points: &[[f64; 3]],
+    ) -> Result<Vec<bool>, PointError> {
+        let mut inside = vec![false; points.len()];
+        let mut open: Vec<u32> = (0..points.len() as u32).collect();
+        for accuracy in [COARSE, FINE] {
+            let asked: Vec<[f64; 3]> = open.iter().map(|&i| points[i as usize]).collect();
+            let found = self.windings(moments, &asked, accuracy)?;
+            let mut next = Vec::new();
+            for (&i, winding) in open.iter().zip(found) {
+                inside[i as usize] = winding.number > 0.5;
+                if (winding.number - 0.5).abs() <= winding.error {
+                    next.push(i);
+                }
+            }
+            open = next;
+        }
+        let asked: Vec<[f64; 3]> = open.iter().map(|&i| points[i as usize]).collect();
+        for (&i, number) in open.iter().zip(self.winding_number(&asked)) {
+            inside[i as usize] = number > 0.5;
+        }
+        Ok(inside)
+    }
+
+    fn windings(
+        &self,
+        moments: &WindingMoments,
+        points: &[[f64; 3]],
+        accuracy: f64,
+    ) -> Result<Vec<Winding>, PointError> {
+        if !moments.fits(self.tree) {
+            return Err(PointError::OtherTree);
+        }
+        // NaN allows nothing.
+        let accuracy = accuracy.max(0.0);
+        let nothing = Winding { number: f64::NAN, error: f64::NAN };
+        Ok(self.in_order(points, nothing, |points, found| {
+            point::winding(self.level, self.tree, moments, points, accuracy, found);
+        }))
+    }
+
     /// The leaf whose cell holds each point; a point in a plane belongs to the upper side. `None`
     /// outside of the tree's box, and for NaN.
     pub fn locate(&self, points: &[[f64; 3]]) -> Vec<Option<Cell>> {
@@ -170,6 +257,16 @@ impl<'a> PointQueries<'a> {
     /// The box of a leaf; `None` if the tree has no such leaf.
     pub fn cell_box(&self, cell: Cell) -> Option<Aabb> {
         cells::cell_box(self.tree, cell)
+    }
+
+    /// All leaves, empty ones included, in the order of their numbers.
+    pub fn cells(&self) -> Vec<Cell> {
+        cells::cells(self.tree)
+    }
+
+    /// The primitives that a leaf refers to, each once; none if the tree has no such leaf.
+    pub fn cell_primitives(&self, cell: Cell) -> Vec<u32> {
+        cells::cell_primitives(self.tree, cell)
     }
 
     /// What [`PointQueries::closest_point`] does, counted, on one thread: steps are treelets, `met` blocks

@@ -58,7 +58,34 @@ fn numbers_that_are_no_cells() {
         let volume = |b: &ropewalk::Aabb| (0..3).map(|a| b.extent(a)).product::<f64>();
         // Each leaf once: together they fill the tree's box.
         let all: f64 = boxes.iter().map(volume).sum();
+        assert_eq!(queries.cells().len(), boxes.len());
         let whole = volume(tree.bounds());
         assert!((all - whole).abs() < 1e-9 * whole, "{all} of {whole}");
+    }
+}
+
+/// Every triangle is in the leaves that hold its vertices, and nothing is in what is no leaf.
+#[test]
+fn leaves_know_their_primitives() {
+    let mut draw = Draw::new(8000);
+    let geometry = meshes::geometry(&meshes::torus(12, 7), (1.0, 0.0));
+    for tree in trees(&mut draw, &geometry) {
+        let queries = PointQueries::new(&tree, &geometry).unwrap();
+        let cells = queries.cells();
+        assert!(cells.is_sorted() && cells.iter().all(|&c| queries.cell_box(c).is_some()));
+        for &cell in &cells {
+            let found = queries.cell_primitives(cell);
+            assert!(found.is_sorted_by(|a, b| a < b), "{found:?}");
+            for id in 0..geometry.len() as u32 {
+                let ropewalk::Shape::Triangle(t) = geometry.shape(id) else { unreachable!() };
+                let centre: [f64; 3] = std::array::from_fn(|a| {
+                    t.vertices.iter().map(|v| f64::from(v[a])).sum::<f64>() / 3.0
+                });
+                if queries.locate(&[centre]) == [Some(cell)] {
+                    assert!(found.contains(&id));
+                }
+            }
+        }
+        assert!(queries.cell_primitives(Cell::from_bits(u32::MAX)).is_empty());
     }
 }

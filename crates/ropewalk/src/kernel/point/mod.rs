@@ -4,6 +4,7 @@
 //! nearest   depth first; of the children of a treelet those that hold primitives and are near enough go on
 //!           the stack with their distances along the axes, the nearest on top
 //! column    all cells that the ray from the point along +z touches, plane by plane
+//! winding   down to cells that are far enough for their moments, and to all triangles near by
 //! ```
 //! In a leaf, eight triangles at a time are looked at by their boxes first. What is found is defined without a tree in `triangle` and [`crate::point`]; brute force uses the same.
 
@@ -13,14 +14,16 @@ mod column;
 mod nearest;
 mod step;
 pub mod triangle;
+mod winding;
 
 pub use nearest::Found;
+pub use winding::Winding;
 
 use super::beam::BeamSimd;
 use super::events::Events;
 use super::level::Level;
 use super::scalar::Scalar;
-use crate::point::Side;
+use crate::point::{Side, WindingMoments};
 use crate::tree::MAX_DEPTH;
 use crate::wide::{LEVELS, WideTree};
 
@@ -71,8 +74,40 @@ pub fn sides<E: Events>(
     }
 }
 
+/// The winding number of each point by moments, at a level that this machine has.
+pub fn winding(
+    level: Level,
+    tree: &WideTree,
+    moments: &WindingMoments,
+    points: &[[f64; 3]],
+    accuracy: f64,
+    found: &mut [Winding],
+) {
+    match level {
+        // SAFETY: the caller gives only levels that this machine has.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 => unsafe { winding_avx2(tree, moments, points, accuracy, found) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 => unsafe { winding_avx512(tree, moments, points, accuracy, found) },
+        _ => winding::winding(tree, moments, points, accuracy, found),
+    }
+}
+
 macro_rules! instantiate {
-    ($nearest:ident, $sides:ident, $level:ty, $features:literal) => {
+    ($nearest:ident, $sides:ident, $winding:ident, $level:ty, $features:literal) => {
+        #[cfg(target_arch = "x86_64")]
+        #[target_feature(enable = $features)]
+        fn $winding(
+            tree: &WideTree,
+            moments: &WindingMoments,
+            points: &[[f64; 3]],
+            accuracy: f64,
+            found: &mut [Winding],
+        ) {
+            winding::winding(tree, moments, points, accuracy, found);
+        }
+
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
         fn $nearest<E: Events>(
@@ -98,10 +133,17 @@ macro_rules! instantiate {
         }
     };
 }
-instantiate!(nearest_avx2, sides_avx2, super::avx2::Avx2, "avx2,fma,bmi1,bmi2,popcnt,lzcnt");
+instantiate!(
+    nearest_avx2,
+    sides_avx2,
+    winding_avx2,
+    super::avx2::Avx2,
+    "avx2,fma,bmi1,bmi2,popcnt,lzcnt"
+);
 instantiate!(
     nearest_avx512,
     sides_avx512,
+    winding_avx512,
     super::avx512::Avx512,
     "avx2,fma,bmi1,bmi2,popcnt,lzcnt,avx512f,avx512vl,avx512bw,avx512dq"
 );

@@ -1,4 +1,10 @@
-//! Solid angles.
+//! Generalised winding numbers: solid angles, summed one by one ([`winding_number`]) or, from afar, by
+//! the moments of many triangles at once ([`WindingMoments`]).
+
+mod moments;
+
+pub use moments::WindingMoments;
+pub(crate) use moments::{Moments, NOTHING};
 
 /// The sum of the signed solid angles of triangles, seen from a point, over 4 pi.
 pub fn winding_number(point: [f64; 3], triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> f64 {
@@ -11,15 +17,23 @@ pub fn winding_number(point: [f64; 3], triangles: impl Iterator<Item = [[f32; 3]
 /// whose front is outside (van Oosterom and Strackee, 1983). 0 from its plane, also from the triangle
 /// itself, so that a point on a closed surface gets the mean of both sides.
 fn half_solid_angle(point: [f64; 3], triangle: [[f32; 3]; 3]) -> f64 {
-    let [a, b, c] =
-        triangle.map(|v| std::array::from_fn::<f64, 3, _>(|i| f64::from(v[i]) - point[i]));
+    let [a, b, c] = triangle.map(|v| std::array::from_fn(|i| f64::from(v[i]) - point[i]));
+    half_angle(tangent(a, b, c))
+}
+
+/// The tangent of half of the solid angle as sine and cosine, up to a common factor. The same
+/// operations in the same order wherever it is inlined, so the same bits.
+#[inline(always)]
+pub(crate) fn tangent(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> (f64, f64) {
     let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
     let length = |p: [f64; 3]| dot(p, p).sqrt();
     let normal = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-    let volume = dot(a, normal);
-    if volume == 0.0 {
-        return 0.0;
-    }
     let (la, lb, lc) = (length(a), length(b), length(c));
-    volume.atan2(la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+    (dot(a, normal), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+}
+
+/// The angle of such a tangent.
+#[inline(always)]
+pub(crate) fn half_angle((sine, cosine): (f64, f64)) -> f64 {
+    if sine == 0.0 { 0.0 } else { sine.atan2(cosine) }
 }

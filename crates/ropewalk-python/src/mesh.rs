@@ -1,0 +1,25 @@
+//! Mesh files as arrays.
+
+use crate::error::Failure;
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use ropewalk_scene::{Loaded, MeshFormat, NffLimits, load};
+use std::path::Path;
+
+/// Vertices and faces.
+type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
+
+/// The mesh in a file; None if its name is not that of a mesh format.
+#[pyfunction]
+pub fn read_mesh<'py>(py: Python<'py>, path: &str) -> PyResult<Option<Arrays<'py>>> {
+    if MeshFormat::of_name(Path::new(path)).is_none() {
+        return Ok(None);
+    }
+    let loaded = py.detach(|| load(path, &NffLimits::default()));
+    let loaded = loaded.map_err(|error| Failure::File(error).into_exception(true))?;
+    let Loaded::Mesh(_, mesh) = loaded else { return Ok(None) };
+    let (v, f) = (mesh.vertices.len(), mesh.faces.len());
+    let vertices = bytemuck::cast_vec::<[f64; 3], f64>(mesh.vertices).into_pyarray(py);
+    let faces = bytemuck::cast_vec::<[u32; 3], u32>(mesh.faces).into_pyarray(py);
+    Ok(Some((vertices.reshape([v, 3])?, faces.reshape([f, 3])?)))
+}

@@ -1,0 +1,101 @@
+//! What can be wrong with a mesh file, and where.
+
+use std::fmt;
+use std::io;
+
+/// An error in a mesh file. Displays as one sentence: `cow.obj: line 12: expected a number for x, found "abc"`.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: {place}{kind}")]
+#[non_exhaustive]
+pub struct MeshError {
+    /// The file as the user named it; `input` if it came from memory.
+    pub file: String,
+    /// Where.
+    pub place: Place,
+    /// What.
+    pub kind: MeshErrorKind,
+}
+
+/// A place in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    Start,
+    /// A line of text, from 1.
+    Line(u64),
+    /// An offset in bytes after decompression.
+    Byte(u64),
+    /// A part by its name in the format, such as `accessors[3].count`.
+    Part(String),
+    /// The end.
+    End,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Start => Ok(()),
+            Place::Line(line) => write!(f, "line {line}: "),
+            Place::Byte(byte) => write!(f, "byte {byte}: "),
+            Place::Part(part) => write!(f, "{part}: "),
+            Place::End => write!(f, "end of the file: "),
+        }
+    }
+}
+
+/// What is wrong.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshErrorKind {
+    /// Something that cannot stand here.
+    #[error("expected {expected}, found {found}")]
+    Unexpected {
+        /// What the format asks for.
+        expected: String,
+        /// What is there, shortened.
+        found: String,
+    },
+    /// The system, or a damaged archive.
+    #[error("{0}")]
+    Io(io::Error),
+}
+
+/// What readers return.
+pub(super) type Result<T> = std::result::Result<T, MeshError>;
+
+impl MeshError {
+    /// The same error, with the name of the file.
+    pub fn in_file(mut self, file: impl Into<String>) -> Self {
+        self.file = file.into();
+        self
+    }
+}
+
+impl From<io::Error> for MeshError {
+    fn from(error: io::Error) -> Self {
+        MeshError { file: "input".into(), place: Place::Start, kind: MeshErrorKind::Io(error) }
+    }
+}
+
+/// Longest text that a message quotes, in characters.
+const QUOTED_CHARS: usize = 60;
+
+/// An error at a place.
+pub(super) fn wrong(
+    place: Place,
+    expected: impl Into<String>,
+    found: impl fmt::Display,
+) -> MeshError {
+    let text = found.to_string();
+    // Control characters, and whatever else a terminal might not like, are escaped.
+    let mut found: String = text
+        .chars()
+        .take(QUOTED_CHARS)
+        .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
+        .collect();
+    if text.chars().nth(QUOTED_CHARS).is_some() {
+        found.push_str("...");
+    }
+    let kind = MeshErrorKind::Unexpected { expected: expected.into(), found };
+    MeshError { file: "input".into(), place, kind }
+}
