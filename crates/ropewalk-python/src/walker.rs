@@ -111,7 +111,8 @@ pub fn walk<'py>(
 
     let found = parts.iter().map(|(_, events)| events.t.len()).sum();
     let (mut at, mut on) = (zeros::<f32>(0)?, zeros::<u32>(0)?);
-    (at.reserve(3 * n), on.reserve(n));
+    at.reserve(3 * n);
+    on.reserve(n);
     let (mut rows, mut walked) = (zeros::<i64>(n + 1)?, zeros::<i32>(0)?);
     let (mut segment, mut t) = (zeros::<i32>(0)?, zeros::<f32>(0)?);
     let (mut prim, mut geom) = (zeros::<i32>(0)?, zeros::<i32>(found)?);
