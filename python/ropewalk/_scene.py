@@ -223,7 +223,7 @@ class Scene(Saved, PointMethods):
         bits = [_ALL_BITS] * len(pairs) if masks is None else _mesh_masks(masks, len(pairs), "instance")
         cores = [scene._core for scene in scenes]
         placed = cls.__new__(cls)
-        core = DoubleCore.place(cores, matrices.reshape(-1), bits, check_threads(threads))
+        core = DoubleCore.place(cores, matrices.reshape(-1), bits, as_threads(threads))
         placed._adopt(core)
         placed._placed = scenes, matrices
         return placed
@@ -478,7 +478,7 @@ class Scene(Saved, PointMethods):
         if strict and (index := rays.first_invalid()) is not None:
             reason = _why(o, d, t_min, t_max, shape, index, double)
             raise InvalidRayError(f"ray {index} can hit nothing: {reason}", "rays", index)
-        threads = check_threads(threads)
+        threads = as_threads(threads)
         return rays, shape, 1 if count <= _FEW_RAYS else threads
 
     def _skip(self, skip: Any, shape: tuple[int, ...]) -> NDArray[np.int32]:
@@ -627,6 +627,7 @@ def load(
     path: str | os.PathLike[str],
     *,
     preset: str = "balanced",
+    precision: str = "auto",
     threads: int = 0,
     progress: bool | Callable[[float], object] | None = None,
 ) -> Scene:
@@ -635,7 +636,7 @@ def load(
     Procedural Databases (Haines 1987).
 
     Triangle or object ``i`` of the file is primitive ``i`` of one mesh, hit on both sides; polygons,
-    spheres, cones and patches of NFF stay what they are. Coordinates are rounded to float32. The other
+    spheres, cones and patches of NFF stay what they are, and are always of single precision. The other
     arguments are those of :class:`Scene`.
 
     Raises:
@@ -649,9 +650,14 @@ def load(
     name = as_path(path)
     mesh = _ropewalk.read_mesh(name)
     if mesh is not None:
-        return Scene(*mesh, preset=preset, threads=threads, progress=progress)
+        return Scene(*mesh, preset=preset, precision=precision, threads=threads, progress=progress)
+    if precision == "double":
+        raise ArgumentError(
+            "precision: expected 'auto' or 'single' for NFF files and built-in scenes, found 'double'",
+            "precision",
+        )
     with _progress(progress) as show:
-        core = Core.load(name, _preset(preset), check_threads(threads), show)
+        core = Core.load(name, _preset(preset), as_threads(threads), show)
     scene = Scene.__new__(Scene)
     scene._adopt(core)
     return scene
@@ -700,7 +706,7 @@ def _build(
     threads: int,
     progress: bool | Callable[[float], object] | None,
 ) -> Core | DoubleCore:
-    preset, threads = _preset(preset), check_threads(threads)
+    preset, threads = _preset(preset), as_threads(threads)
     if precision not in ("auto", "single", "double"):
         raise ArgumentError(
             f"precision: expected 'auto', 'single' or 'double', found {precision!r}", "precision"
@@ -711,8 +717,8 @@ def _build(
         precision = "double" if any(by > _PRECISION * size for by, size in moved) else "single"
     if precision == "double" and sum(len(mesh[1]) for mesh in meshes) > 0:
         return _build_double(meshes, masks, preset, threads, progress)
-    for (by, size), (_, _, name) in zip(moved, meshes):
-        if _PRECISION * size < by < np.inf:
+    for (by, size), (_, corners, name) in zip(moved, meshes):
+        if len(corners) and _PRECISION * size < by < np.inf:
             warnings.warn(
                 f"{name}vertices: rounding to float32 moves vertices by up to {by:.3g}, where the "
                 f"diagonal of all is {size:.3g}; leave out precision='single'",
@@ -774,12 +780,6 @@ def _cells(start: Any, shape: tuple[int, ...]) -> NDArray[np.int64] | None:
     if cells.dtype == np.uint64:
         cells = np.minimum(cells, np.uint64(2**63 - 1))
     return np.ascontiguousarray(per_ray(cells, shape, "start"), np.int64)
-
-
-def check_threads(threads: int) -> int:
-    return as_integer(threads, "threads", 0, _MAX_THREADS) or default_threads()
-def _threads(threads: int) -> int:
-    return as_threads(threads)
 
 
 def _mesh(

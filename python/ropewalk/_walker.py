@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._arrays import ArrayLike, as_array, as_float32, as_rows, per_ray
+from ._arrays import ArrayLike, as_array, as_float32, as_rows, as_threads, per_ray
 from ._errors import ArgumentError, ArgumentTypeError, InvalidRayWarning
 from ._ropewalk import cells_of, walk
-from ._scene import Scene, check_threads
+from ._scene import Scene
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -98,7 +98,7 @@ class Walker:
                 f"scene: expected a ropewalk.Scene, found {type(scene).__name__}", "scene"
             )
         scene._single("scene")
-        self._scene, self._threads = scene, check_threads(threads)
+        self._scene, self._threads = scene, as_threads(threads)
         self._positions = as_float32(as_rows(positions, "positions")).copy()
         self._stopped = np.full(len(self._positions), _NONE, np.uint32)
 

@@ -114,7 +114,11 @@ def test_far_from_the_origin(tmp_path):
     path = tmp_path / "far.obj"
     path.write_text("v 10000000.1 0 0\nv 10000001.3 0 0\nv 10000000.7 1 0\nf 1 2 3\n")
     with pytest.warns(ropewalk.PrecisionWarning):
-        ropewalk.load(path)
+        ropewalk.load(path, precision="single")
+    scene = ropewalk.load(path)
+    assert scene.precision == "double" and scene.bounds[1, 0] == 10000001.3
+    with pytest.raises(ropewalk.ArgumentError, match="precision"):
+        ropewalk.load("spd:tetra:2", precision="double")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert ropewalk.read_mesh(path)[0][0, 0] == 10000000.1
