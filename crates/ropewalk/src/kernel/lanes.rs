@@ -134,6 +134,7 @@ impl<C> Lanes<C> {
 
 impl<Q: BatchQuery, C: Crowd<Q>> Source<Q> for Lanes<C> {
     const WAITS: bool = true;
+    const SHORT: bool = true;
 
     #[inline(always)]
     fn rays(&self) -> &[Ray] {
