@@ -153,8 +153,6 @@ struct Place {
 pub struct Path {
     /// The leaf in which the last segment was and its cell, which may hold nothing.
     leaf: Place,
-    /// The one before it: particles go to and fro.
-    last: Place,
     slack: f32,
     depth: usize,
     places: [Place; MAX_WIDE_DEPTH],
@@ -177,7 +175,7 @@ impl Path {
         let cell = corners(&tree.outer_box());
         let places = [Place { cell, code: tree.root() }; MAX_WIDE_DEPTH];
         let leaf = Place { cell: Corners::NOTHING, code: 0 };
-        Some(Path { leaf, last: leaf, slack: slack_of(tree), depth: 0, places })
+        Some(Path { leaf, slack: slack_of(tree), depth: 0, places })
     }
 
     /// The code of the cell from which a ray is to be walked; `None` if it hits nothing.
@@ -195,12 +193,7 @@ impl Path {
         // SAFETY: passed on to the caller.
         let code = unsafe {
             let segment = L::segment(ray, self.slack);
-            let mut known = L::lies_in(&segment, &self.leaf.cell);
-            if !known && L::lies_in(&segment, &self.last.cell) {
-                std::mem::swap(&mut self.leaf, &mut self.last);
-                known = true;
-            }
-            if known {
+            if L::lies_in(&segment, &self.leaf.cell) {
                 let code = self.leaf.code;
                 if Self::is_clear::<L, E>(tree, &segment, code, events) { 0 } else { code }
             } else {
@@ -238,7 +231,7 @@ impl Path {
                 let reached = L::reached(segment, treelet);
                 if reached == 0 {
                     let cell = L::narrow(&cell, treelet, L::child_of_end(segment, treelet));
-                    self.last = std::mem::replace(&mut self.leaf, Place { cell, code: 0 });
+                    self.leaf = Place { cell, code: 0 };
                     return 0;
                 }
                 if reached & (reached - 1) != 0 {
@@ -249,7 +242,7 @@ impl Path {
                 let code = treelet.child[child];
                 let place = Place { cell: L::narrow(&cell, treelet, child), code };
                 if code & LEAF != 0 {
-                    self.last = std::mem::replace(&mut self.leaf, place);
+                    self.leaf = place;
                     let clear = Self::is_clear::<L, E>(tree, segment, code, events);
                     return if clear { 0 } else { code };
                 }

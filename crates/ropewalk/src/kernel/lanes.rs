@@ -134,7 +134,6 @@ impl<C> Lanes<C> {
 
 impl<Q: BatchQuery, C: Crowd<Q>> Source<Q> for Lanes<C> {
     const WAITS: bool = true;
-    const SHORT: bool = true;
 
     #[inline(always)]
     fn rays(&self) -> &[Ray] {

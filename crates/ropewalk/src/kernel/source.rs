@@ -15,9 +15,6 @@ pub trait Source<Q: BatchQuery> {
     /// True if what becomes of a ray decides which one comes next: answers are not put off then.
     const WAITS: bool = false;
 
-    /// True if rays are short: they mostly hit nothing where they start.
-    const SHORT: bool = false;
-
     /// The rays by their indices; those under way stay as they are.
     fn rays(&self) -> &[Ray];
 
@@ -86,8 +83,6 @@ impl<'a> FromEntry<'a> {
 }
 
 impl<Q: BatchQuery> Source<Q> for FromEntry<'_> {
-    const SHORT: bool = true;
-
     #[inline(always)]
     fn rays(&self) -> &[Ray] {
         self.rays
@@ -136,8 +131,6 @@ impl<'a> FromCells<'a> {
 }
 
 impl<Q: BatchQuery> Source<Q> for FromCells<'_> {
-    const SHORT: bool = true;
-
     #[inline(always)]
     fn rays(&self) -> &[Ray] {
         self.rays

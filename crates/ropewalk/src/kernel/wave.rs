@@ -26,7 +26,7 @@ use super::query::BatchQuery;
 use super::slot::{Loaded, Slot};
 use super::source::Source;
 use crate::geometry::Geometry;
-use crate::wide::{BLOCK_LINES, LEAF, LINE, WIDTH, WideTree, code_line, code_offset};
+use crate::wide::{BLOCK_LINES, LINE, WIDTH, WideTree, code_line, code_offset};
 
 /// Rays in flight on a core.
 pub const WAVE: usize = 24;
@@ -120,7 +120,7 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source<Q>, E: Events, const SHAPES
         // SAFETY: passed on to the caller.
         unsafe {
             if wave.lists.free.len > 0 {
-                wave.refill::<L, SHAPES>();
+                wave.refill::<L>();
             }
             if wave.lists.stepping.len + wave.lists.waiting.len == 0 {
                 let exact = Exact { lines: tree.lines(), rays: wave.source.rays() };
@@ -299,7 +299,7 @@ impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
 
     /// Puts the next rays that may hit anything into the free slots.
     #[inline(always)]
-    unsafe fn refill<L: Simd, const SHAPES: bool>(&mut self) {
+    unsafe fn refill<L: Simd>(&mut self) {
         let mut n = 0;
         while self.lists.free.len > 0 {
             let (k, _) = self.lists.free.get(self.lists.free.len - 1);
@@ -326,23 +326,6 @@ impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
             } else if ready == 0 {
                 self.query.miss(index);
                 continue;
-            }
-            if S::SHORT && code & LEAF != 0 && ready != 0 {
-                // Most of these rays miss what is there, and then need no place in the wave.
-                let exact = Exact { lines: self.tree.lines(), rays: self.source.rays() };
-                let leaves = Leaves { tree: self.tree, geometry: self.geometry, exact };
-                let (mut line, mut met) = (code_line(code), 0);
-                for _ in 0..self.tree.block_count(code) {
-                    self.events.block();
-                    // SAFETY: the codes of a tree lead to its blocks; the rest passed on to the caller.
-                    met |= unsafe { leaves.meet::<L, SHAPES>(slot, line) };
-                    line += BLOCK_LINES;
-                }
-                if met == 0 {
-                    self.events.rays(1);
-                    self.query.miss(index);
-                    continue;
-                }
             }
             slot.code[1] = code;
             self.moved.set(n, k, code);
