@@ -9,10 +9,10 @@ import numpy as np
 
 from . import _ropewalk
 from ._arrays import ArrayLike, as_faces, as_float32, as_rows
-from ._errors import ArgumentError, ArgumentTypeError
+from ._errors import ArgumentError, ArgumentTypeError, SceneWriteError
 
 if TYPE_CHECKING:
-    from ._ropewalk import Core
+    from ._ropewalk import Core, DoubleCore
     from ._scene import Scene
 
 
@@ -21,7 +21,7 @@ class Saved:
 
     __slots__ = ()
 
-    _core: Core
+    _core: Core | DoubleCore
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Saves the scene with its tree, for :meth:`open`.
@@ -33,14 +33,22 @@ class Saved:
             path: the file; one that is there is replaced, and whoever has it open keeps it.
 
         Raises:
-            SceneWriteError: it cannot be written; nothing is left behind.
+            SceneWriteError: it cannot be written, and nothing is left behind; or the scene is of double
+                precision.
 
         >>> import os, tempfile, ropewalk
         >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     scene.save(os.path.join(folder, "triangle.rope"))
         """
-        _ropewalk.save(self._single("save"), _path(path))
+        name = _path(path)
+        if not isinstance(self._core, _ropewalk.Core):
+            raise SceneWriteError(
+                f"cannot save {name}: scenes of double precision cannot be saved; make the scene with "
+                "precision='single'",
+                "path",
+            )
+        _ropewalk.save(self._core, name)
 
     @classmethod
     def open(
@@ -63,7 +71,8 @@ class Saved:
             copy: read the file into memory instead. A mapped file must not be written into or cut off
                 while the scene is in use: answers may be anything then, and the process may end.
                 Saving over it is safe.
-            vertices: with ``faces``, open the file only if the scene was made of these arrays.
+            vertices: with ``faces``, open the file only if the scene was made of these arrays, rounded to
+                float32.
             faces: see ``vertices``.
 
         Raises:

@@ -213,6 +213,14 @@ def test_saving_fails_and_leaves_nothing(scene, tmp_path):
         scene.save(None)
 
 
+def test_scenes_of_double_precision_are_refused(tmp_path):
+    v, f = random_mesh(10, 1)
+    scene = ropewalk.Scene(v.astype(np.float64) + 0.1, f, precision="double")
+    with pytest.raises(ropewalk.SceneWriteError, match="precision='single'"):
+        scene.save(tmp_path / "a")
+    assert not os.listdir(tmp_path)
+
+
 def test_whoever_has_a_file_open_keeps_it(scene, saved):
     mapped = ropewalk.Scene.open(saved)
     ropewalk.Scene(*random_mesh(10, 9)).save(saved)

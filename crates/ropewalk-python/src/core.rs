@@ -468,7 +468,7 @@ impl Core {
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        Ok(Core { geometry, tree, report: report.into(), starts, masks, preset })
+        Ok(Core { geometry, tree, report: Build::from(&report), starts, masks, preset })
     }
 
     /// The geometry.

@@ -254,7 +254,7 @@ impl DoubleCore {
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        let held = Held::Meshes(Arc::new(object), report.into());
+        let held = Held::Meshes(Arc::new(object), Build::from(&report));
         Ok(DoubleCore { held, starts, masks, preset })
     }
 
@@ -354,7 +354,7 @@ impl DoubleCore {
             }
             Held::Instances(scene) => {
                 let figures =
-                    crate::core::figures(py, &scene.report().clone().into(), self.preset, count)?;
+                    crate::core::figures(py, &Build::from(scene.report()), self.preset, count)?;
                 let mut objects: Vec<&Arc<Object>> =
                     scene.instances().iter().map(|placed| &placed.object).collect();
                 let flat = |object: &&Arc<Object>| object.geometry.degenerate_count();

@@ -17,9 +17,9 @@ pub struct Build {
     pub seconds: f64,
 }
 
-impl From<BuildReport> for Build {
-    fn from(report: BuildReport) -> Build {
-        let BuildReport { primitives, degenerate, duplication, tree, seconds, .. } = report;
+impl From<&BuildReport> for Build {
+    fn from(report: &BuildReport) -> Build {
+        let BuildReport { primitives, degenerate, duplication, tree, seconds, .. } = report.clone();
         Build { primitives, degenerate, duplication, tree, seconds }
     }
 }

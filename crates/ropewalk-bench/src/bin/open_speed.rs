@@ -1,7 +1,7 @@
 //! What saving and opening a scene costs, and what processes that open it share.
 //!
 //! `open_speed SCENES [ROUNDS]`, names separated by commas: milliseconds to save, to open a map of a file in the
-//! page cache (median and least), with all checksums, and to read it into memory; then million rays per second of
+//! page cache, with all checksums, and to read it into memory (median and least by the wall clock, median of CPU time); then million rays per second of
 //! diffuse rays over the tree as built, mapped and read, in turn; then two processes open the file, cast the same
 //! rays, and say what of the map they hold: all of it (Rss), its share (Pss), and what is theirs alone.
 
@@ -12,14 +12,13 @@ use ropewalk::kernel::BatchCaster;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray};
 use ropewalk_bench::answer::BenchHit;
-use ropewalk_bench::harness::Spread;
+use ropewalk_bench::harness::{Clock, Spread};
 use ropewalk_bench::own::geometry;
 use ropewalk_bench::scene::{Catalog, Scene};
 use ropewalk_bench::workload::{Generator, Kind, Random, Sizes, Workload};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Instant;
 
 /// Side of the picture from which the rays come.
 const SIDE: usize = 512;
@@ -47,11 +46,12 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Milliseconds.
-fn time<T>(work: impl FnOnce() -> T) -> (f64, T) {
-    let start = Instant::now();
+/// Milliseconds by the wall clock and of CPU time.
+fn time<T>(work: impl FnOnce() -> T) -> ([f64; 2], T) {
+    let clock = Clock::start();
     let value = work();
-    (1e3 * start.elapsed().as_secs_f64(), value)
+    let (cpu, wall) = clock.elapsed();
+    ([1e3 * wall, 1e3 * cpu], value)
 }
 
 fn measure(scene: &Scene, path: &Path, rounds: usize) -> anyhow::Result<()> {
@@ -61,19 +61,20 @@ fn measure(scene: &Scene, path: &Path, rounds: usize) -> anyhow::Result<()> {
     let (saving, saved) = time(|| ropewalk_file::save(path, &Contents::new(&tree, &geometry)));
     let saved = saved?;
     println!(
-        "{}: {} triangles, {:.1} MiB, {} treelets, {} blocks; saved in {saving:.0} ms",
+        "{}: {} triangles, {:.1} MiB, {} treelets, {} blocks; saved in {:.0} ms",
         scene.mesh.name,
         geometry.len(),
         saved.bytes as f64 / f64::from(1 << 20),
         tree.treelets(),
-        tree.blocks()
+        tree.blocks(),
+        saving[0]
     );
     let open = |check| {
         let each = (0..rounds).map(|_| {
             let (ms, opened) = time(|| ropewalk_file::open(path, check));
             opened.map(|_| ms)
         });
-        each.collect::<Result<Vec<f64>, _>>()
+        each.collect::<Result<Vec<[f64; 2]>, _>>()
     };
     let read = || {
         let (ms, opened) = time(|| ropewalk_file::read(path, Check::Structure));
@@ -84,8 +85,15 @@ fn measure(scene: &Scene, path: &Path, rounds: usize) -> anyhow::Result<()> {
         ("map, checksums", open(Check::Everything)?),
         ("read", (0..rounds).map(|_| read()).collect::<Result<_, _>>()?),
     ] {
-        let spread = Spread::of(&times).context("at least one round")?;
-        println!("  opened ({name}): median {:.2} ms, least {:.2} ms", spread.median, spread.min);
+        let of = |clock: usize| {
+            let times: Vec<f64> = times.iter().map(|both| both[clock]).collect();
+            Spread::of(&times).context("at least one round")
+        };
+        let (wall, cpu) = (of(0)?, of(1)?);
+        println!(
+            "  opened ({name}): median {:.2} ms, least {:.2} ms; CPU median {:.2} ms",
+            wall.median, wall.min, cpu.median
+        );
     }
 
     let mapped = ropewalk_file::open(path, Check::Structure)?;
@@ -97,7 +105,7 @@ fn measure(scene: &Scene, path: &Path, rounds: usize) -> anyhow::Result<()> {
         for (i, tree) in [&tree, &mapped.tree, &read.tree].into_iter().enumerate() {
             let caster = BatchCaster::new(tree, &geometry).with_threads(1);
             let (ms, found) = time(|| caster.closest_hit(&rays.rays));
-            seconds[i].push(ms / 1e3);
+            seconds[i].push(ms[1] / 1e3);
             hits.push(found);
         }
     }
@@ -107,7 +115,7 @@ fn measure(scene: &Scene, path: &Path, rounds: usize) -> anyhow::Result<()> {
         rays.rays.len() as f64 * 1e-6 / median
     };
     println!(
-        "  {} diffuse rays, Mrays/s: built {:.2}, mapped {:.2}, read {:.2}",
+        "  {} diffuse rays, Mrays/s of CPU time: built {:.2}, mapped {:.2}, read {:.2}",
         rays.rays.len(),
         rate(0),
         rate(1),
