@@ -14,9 +14,11 @@ from . import _ropewalk
 from ._arrays import (
     ArrayLike,
     as_array,
+    as_choice,
     as_faces,
     as_float32,
     as_integer,
+    as_limit,
     as_masks,
     as_points,
     as_rows,
@@ -61,7 +63,10 @@ class Scene(PointMethods):
             ``"compact"`` for a small one.
         threads: threads of the build; 0 is one a processor that this process may use. The tree is the
             same for any number.
-        progress: True for a bar (where tqdm is installed), or a function of the share done.
+        progress: True for a bar (where tqdm is installed), or a function of the share done, which may raise to
+            stop the build.
+        memory_limit: bytes that the scene and its build may take beyond the arrays given. A build that needs
+            more is refused before it takes any; one that comes close gets a smaller tree.
 
     Faces without area are kept and never hit; both sides of others are. A scene without faces is
     valid, and every ray misses it.
@@ -69,7 +74,8 @@ class Scene(PointMethods):
     Raises:
         ArgumentError: wrong shapes, vertices that are not finite, faces that name none.
         ArgumentTypeError: arrays that are no real numbers, faces that are no integers.
-        OutOfMemoryError: the tree does not fit into memory.
+        OutOfMemoryError: the tree does not fit into memory, or into ``memory_limit``; the message says how
+            much it needs.
         KeyboardInterrupt: Ctrl-C stops a build within a fraction of a second.
 
     >>> import ropewalk
@@ -90,9 +96,10 @@ class Scene(PointMethods):
         preset: str = "balanced",
         threads: int = 0,
         progress: bool | Callable[[float], object] | None = None,
+        memory_limit: int | None = None,
     ) -> None:
         mesh = _mesh(vertices, faces, "")
-        self._adopt(_build([mesh], [_ALL_BITS], preset, threads, progress))
+        self._adopt(_build([mesh], [_ALL_BITS], preset, threads, progress, memory_limit))
 
     @classmethod
     def from_meshes(
@@ -103,6 +110,7 @@ class Scene(PointMethods):
         preset: str = "balanced",
         threads: int = 0,
         progress: bool | Callable[[float], object] | None = None,
+        memory_limit: int | None = None,
     ) -> Scene:
         """A scene of several meshes; hits name the mesh (``geom_id``) and the face in it (``prim_id``).
 
@@ -147,7 +155,7 @@ class Scene(PointMethods):
                     f"masks: expected {len(checked)} masks, one a mesh, found {bits}", "masks"
                 )
         scene = cls.__new__(cls)
-        scene._adopt(_build(checked, bits, preset, threads, progress))
+        scene._adopt(_build(checked, bits, preset, threads, progress, memory_limit))
         return scene
 
     def _adopt(self, core: Core) -> None:
@@ -167,6 +175,7 @@ class Scene(PointMethods):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> Hits:
@@ -183,6 +192,9 @@ class Scene(PointMethods):
             skip: a primitive that each ray ignores, usually the one that it leaves: ``prim_id`` of a
                 scene of one mesh, a pair ``(prim_id, geom_id)``, or the :class:`Hits` that the rays
                 start at. -1 ignores nothing.
+            faces: which sides are hit: ``"both"``, ``"front"``, the side from which vertices run
+                counter-clockwise, or ``"back"``; rays pass through the other one. Scenes of triangles alone
+                have a choice.
             threads: threads of this call; 0 is one a processor that this process may use.
             strict: refuse rays that can hit nothing, instead of counting them in a warning.
 
@@ -207,7 +219,7 @@ class Scene(PointMethods):
         False
         """
         rays, shape, threads = self._rays(
-            origins, directions, t_min, t_max, masks, skip, threads, strict
+            origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
         t, prim, geom, invalid, first = self._core.closest_hit(rays, threads)
         _warn(invalid, first)
@@ -222,6 +234,7 @@ class Scene(PointMethods):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> NDArray[np.bool_]:
@@ -235,7 +248,7 @@ class Scene(PointMethods):
         array([ True, False])
         """
         rays, shape, threads = self._rays(
-            origins, directions, t_min, t_max, masks, skip, threads, strict
+            origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
         hit, invalid, first = self._core.occluded(rays, threads)
         _warn(invalid, first)
@@ -250,6 +263,7 @@ class Scene(PointMethods):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> HitLists:
@@ -268,7 +282,7 @@ class Scene(PointMethods):
         array([1., 2.], dtype=float32)
         """
         return self._lists(
-            None, origins, directions, t_min, t_max, masks, skip, threads, strict
+            None, origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
 
     def first_hits(
@@ -281,6 +295,7 @@ class Scene(PointMethods):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> HitLists:
@@ -295,7 +310,7 @@ class Scene(PointMethods):
         array([1.], dtype=float32)
         """
         k = as_integer(k, "k", 0, 2**63 - 1)
-        return self._lists(k, origins, directions, t_min, t_max, masks, skip, threads, strict)
+        return self._lists(k, origins, directions, t_min, t_max, masks, skip, faces, threads, strict)
 
     def count_hits(
         self,
@@ -306,6 +321,7 @@ class Scene(PointMethods):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> NDArray[np.int32]:
@@ -319,7 +335,7 @@ class Scene(PointMethods):
         array([2, 0], dtype=int32)
         """
         rays, shape, threads = self._rays(
-            origins, directions, t_min, t_max, masks, skip, threads, strict
+            origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
         counts, invalid, first = self._core.count_hits(rays, threads)
         _warn(invalid, first)
@@ -334,11 +350,12 @@ class Scene(PointMethods):
         t_max: ArrayLike,
         masks: ArrayLike | None,
         skip: Any,
+        faces: str,
         threads: int,
         strict: bool,
     ) -> HitLists:
         rays, shape, threads = self._rays(
-            origins, directions, t_min, t_max, masks, skip, threads, strict
+            origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
         offsets, t, prim, geom, invalid, first = self._core.first_hits(rays, threads, k)
         _warn(invalid, first, stacklevel=4)
@@ -352,6 +369,7 @@ class Scene(PointMethods):
         t_max: ArrayLike,
         masks: ArrayLike | None,
         skip: Any,
+        faces: str,
         threads: int,
         strict: bool,
     ) -> tuple[Rays, tuple[int, ...], int]:
@@ -367,6 +385,13 @@ class Scene(PointMethods):
         count = 1
         for length in shape:
             count *= length
+        sides = as_choice(faces, "faces", ("both", "front", "back"))
+        if sides != "both" and self._core.has_shapes:
+            # A sphere has a hit of each side, of which queries know the first.
+            raise ArgumentError(
+                f"faces: expected 'both' for a scene of other primitives than triangles, found {faces!r}",
+                "faces",
+            )
         rays = Rays(
             count,
             _points(o, shape),
@@ -375,6 +400,7 @@ class Scene(PointMethods):
             as_float32(per_ray(as_array(t_max, "t_max"), shape, "t_max")),
             None if masks is None else per_ray(as_masks(masks, "masks"), shape, "masks"),
             None if skip is None else self._skip(skip, shape),
+            sides,
         )
         if strict and (index := rays.first_invalid()) is not None:
             reason = _why(o, d, t_min, t_max, shape, index)
@@ -498,6 +524,20 @@ class Scene(PointMethods):
         """What a notebook shows: the report as a table."""
         return f"<b>ropewalk.Scene</b>{self.report._repr_html_()}"
 
+    def plot(self) -> Any:
+        """A matplotlib figure: leaves by the number of their primitives, and what a line is predicted to
+        cost in them (scenes of triangles).
+
+        Raises:
+            ImportError: matplotlib is not installed (``pip install 'ropewalk[plot]'``).
+
+        >>> import ropewalk
+        >>> figure = ropewalk.load("spd:tetra:3").plot()  # doctest: +SKIP
+        """
+        from ._plot import plot
+
+        return plot(self)
+
     def __copy__(self) -> Scene:
         return self
 
@@ -515,6 +555,7 @@ def load(
     preset: str = "balanced",
     threads: int = 0,
     progress: bool | Callable[[float], object] | None = None,
+    memory_limit: int | None = None,
 ) -> Scene:
     """Loads a scene: a mesh file as :func:`read_mesh` reads it (OBJ, PLY, STL, OFF, glTF), an NFF file,
     both gzipped or not, or a built-in scene, ``"spd:NAME"`` or ``"spd:NAME:SIZE"`` of the Standard
@@ -535,9 +576,12 @@ def load(
     name = as_path(path)
     mesh = _ropewalk.read_mesh(name)
     if mesh is not None:
-        return Scene(*mesh, preset=preset, threads=threads, progress=progress)
+        return Scene(
+            *mesh, preset=preset, threads=threads, progress=progress, memory_limit=memory_limit
+        )
     with _progress(progress) as show:
-        core = Core.load(name, _preset(preset), _threads(threads), show)
+        limit = as_limit(memory_limit)
+        core = Core.load(name, _preset(preset), _threads(threads), show, limit)
     scene = Scene.__new__(Scene)
     scene._adopt(core)
     return scene
@@ -564,10 +608,14 @@ def _build(
     preset: str,
     threads: int,
     progress: bool | Callable[[float], object] | None,
+    memory_limit: int | None,
 ) -> Core:
     with _progress(progress) as show:
         vertices, faces = [mesh[0] for mesh in meshes], [mesh[1] for mesh in meshes]
-        return Core.build(vertices, faces, masks, _preset(preset), _threads(threads), show)
+        limit = as_limit(memory_limit)
+        return Core.build(
+            vertices, faces, masks, _preset(preset), _threads(threads), show, limit
+        )
 
 
 def _preset(preset: str) -> str:

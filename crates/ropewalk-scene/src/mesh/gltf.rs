@@ -270,7 +270,7 @@ impl<'a> Reader<'a> {
             return Err(wrong(place, what, wrong_one));
         }
         let n = indices.len();
-        if n < 3 && n > 0 || mode == 4 && n % 3 != 0 {
+        if n < 3 && n > 0 || mode == 4 && !n.is_multiple_of(3) {
             return Err(wrong(place, "three vertices a triangle", n));
         }
         let triangles = if mode == 4 { n / 3 } else { n.saturating_sub(2) };

@@ -168,6 +168,11 @@ pub struct BuildSettings {
     /// Kapustin 2007) instead of sweeping over all of them; `usize::MAX` is the exact sweep
     /// everywhere. Read by [`Measure::MacDonaldBooth`] alone.
     pub binned_from: usize,
+    /// Bytes that a build for the wide tree may take beyond its geometry. One that needs more by
+    /// [`estimated_bytes`](super::estimated_bytes) without any duplication is refused before it begins; others get
+    /// no more references than fit, and what the tree takes is checked again, exactly, before it is
+    /// laid out. The tree depends on the limit, as on any setting. `None` is no limit.
+    pub memory_limit: Option<u64>,
     /// Threads; 0 is one per core. The tree is the same for any number.
     pub threads: usize,
 }
@@ -187,6 +192,7 @@ impl Default for BuildSettings {
             clipping: true,
             max_duplication: 32.0,
             binned_from: usize::MAX,
+            memory_limit: None,
             threads: 0,
         }
     }
