@@ -18,6 +18,8 @@ import ropewalk
 
 SIDE = 512
 CHORDS = 1 << 16
+#: Points of a round.
+POINTS = 1 << 16
 #: Rays of a round of trimesh, which asks again behind each hit.
 FEW_CHORDS = 1 << 12
 
@@ -170,6 +172,77 @@ def rates(engines, which, rays, rounds, threads):
     return {n: len(asked[n][1]) / statistics.median(times[n][1:]) / 1e6 for n in asked}
 
 
+def point_engines(vertices, faces, scene, threads):
+    """Functions of points: name, those that tell inside, distances and signed distances."""
+    made = {
+        "ropewalk": (
+            lambda p: scene.contains(p, threads=threads),
+            lambda p: scene.distance(p, threads=threads),
+            lambda p: scene.signed_distance(p, threads=threads),
+        ),
+        "ropewalk winding": (
+            lambda p: scene.contains(p, method="winding", threads=threads),
+            None,
+            None,
+        ),
+    }
+    try:
+        import open3d
+    except ImportError:
+        pass
+    else:
+        core, device = open3d.core, open3d.t.geometry.RaycastingScene(nthreads=threads)
+        device.add_triangles(core.Tensor(vertices), core.Tensor(np.uint32(faces)))
+        asks = ("compute_occupancy", "compute_distance", "compute_signed_distance")
+        made["Open3D"] = tuple(
+            lambda p, ask=getattr(device, ask): ask(p, nthreads=threads).numpy() for ask in asks
+        )
+    try:
+        import trimesh
+    except ImportError:
+        pass
+    else:
+        mesh = trimesh.Trimesh(vertices, faces, process=False)
+        made["trimesh"] = (mesh.contains, None, None)
+    return made
+
+
+def compare_points(name, vertices, faces, scene, arguments, rng):
+    """Millions of points a second, uniform in the box and near the surface."""
+    made = point_engines(vertices, faces, scene, arguments.threads)
+    low, high = scene.bounds.astype(np.float64)
+    corners = vertices[faces[rng.integers(0, len(faces), POINTS)]].astype(np.float64)
+    weights = rng.dirichlet([1, 1, 1], POINTS)
+    on = np.einsum("ij,ijk->ik", weights, corners)
+    shift = rng.normal(size=on.shape)
+    shift *= 0.01 * np.linalg.norm(high - low) * rng.random((POINTS, 1)) / np.linalg.norm(
+        shift, axis=1, keepdims=True
+    )
+    places = {"box": rng.uniform(low, high, (POINTS, 3)), "near": on + shift}
+    for place, points in places.items():
+        points = np.float32(points)
+        for which, query in enumerate(("contains", "distance", "signed distance")):
+            asked = {n: (q[which], points.copy()) for n, q in made.items() if q[which] is not None}
+            times = {n: [] for n in asked}
+            answers = {}
+            for _ in range(arguments.rounds + 1):
+                for engine, (ask, p) in asked.items():
+                    start = time.process_time() if arguments.threads == 1 else time.perf_counter()
+                    answers[engine] = np.asarray(ask(p))
+                    now = time.process_time() if arguments.threads == 1 else time.perf_counter()
+                    times[engine].append(now - start)
+            found = {n: POINTS / statistics.median(t[1:]) / 1e6 for n, t in times.items()}
+            row = ", ".join(f"{engine} {rate:.3g}" for engine, rate in found.items())
+            ours = answers["ropewalk"]
+            if which == 0:
+                differ = {n: float(np.mean((a > 0.5) != ours)) for n, a in answers.items()}
+            else:
+                scale = np.linalg.norm(high - low)
+                differ = {n: float(np.abs(a - ours).max() / scale) for n, a in answers.items()}
+            off = ", ".join(f"{n} {x:.2g}" for n, x in differ.items() if n != "ropewalk")
+            print(f"{name} {place} {query}: {row}; differ: {off}", flush=True)
+
+
 def agree(engines, rays):
     """Checks answers against embreex's robust ones: share of rays on which primitives differ."""
     ours, theirs = (engines[n][0](*rays) for n in ("ropewalk", "embreex robust"))
@@ -214,6 +287,7 @@ def main():
     parser.add_argument("--scenes", default="bunny,atrium,soup1m")
     parser.add_argument("--rounds", type=int, default=7)
     parser.add_argument("--threads", type=int, default=1)
+    parser.add_argument("--points", action="store_true", help="points instead of rays")
     arguments = parser.parse_args()
     print(f"ropewalk {ropewalk.__version__}, {ropewalk.simd_level()}, {arguments.threads} threads, "
           f"medians of {arguments.rounds} rounds; millions of rays a second")
@@ -222,6 +296,9 @@ def main():
         vertices, faces = read_ply(arguments.data / "mesh/bunny.ply.gz" if name == "bunny" else file)
         scene = ropewalk.Scene(vertices, faces)
         rng = np.random.default_rng(1)
+        if arguments.points:
+            compare_points(name, vertices, faces, scene, arguments, rng)
+            continue
         made = engines(vertices, faces, scene, arguments.threads)
         eye = primary(*view(name, arguments, *scene.bounds.astype(np.float64)))
         *bounced, left = diffuse(scene, eye, rng)

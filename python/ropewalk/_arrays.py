@@ -98,6 +98,23 @@ def as_threads(value: Any) -> int:
     return as_integer(value, "threads", 0, MAX_THREADS) or default_threads()
 
 
+def as_limit(value: Any) -> int | None:
+    """Bytes, or no limit."""
+    return None if value is None else as_integer(value, "memory_limit", 0, 2**63 - 1)
+
+
+def as_choice(value: Any, argument: str, choices: tuple[str, ...]) -> str:
+    """One of some words."""
+    if not isinstance(value, str):
+        raise ArgumentTypeError(
+            f"{argument}: expected a string, found {type(value).__name__}", argument
+        )
+    if value not in choices:
+        expected = ", ".join(map(repr, choices))
+        raise ArgumentError(f"{argument}: expected one of {expected}, found {value!r}", argument)
+    return value
+
+
 def as_faces(value: ArrayLike, argument: str, vertices: int) -> np.ndarray:
     """Faces as uint32, every index checked before it is narrowed."""
     faces = as_rows(value, argument)

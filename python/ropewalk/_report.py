@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from html import escape
+from math import log1p
 
 
 @dataclass(frozen=True)
@@ -81,8 +82,35 @@ class Report:
         return "\n".join(f"{name:{width}}  {value}" for name, value in rows)
 
     def _repr_html_(self) -> str:
-        rows = (f"<tr><th>{escape(k)}</th><td>{escape(v)}</td></tr>" for k, v in self._rows())
-        return f"<table>{''.join(rows)}</table>"
+        rows = (
+            f"<tr><th style='text-align:left'>{escape(k)}</th><td style='text-align:left'>{escape(v)}</td></tr>"
+            for k, v in self._rows()
+        )
+        return f"<table>{''.join(rows)}</table>{self._histogram()}"
+
+    def _histogram(self) -> str:
+        """Leaves by number of references as a small picture, heights by their logarithms."""
+        last = max((size for size, count in enumerate(self.leaf_sizes) if count), default=0)
+        counts = self.leaf_sizes[: max(last, 8) + 1]
+        top = log1p(max(counts))
+        if top == 0:
+            return ""
+        width, height = 9, 60
+        bars = []
+        for size, count in enumerate(counts):
+            tall = height * log1p(count) / top
+            more = " or more" if size == len(self.leaf_sizes) - 1 else ""
+            bars.append(
+                f"<rect x='{width * size}' y='{height - tall:.1f}' width='{width - 1}' height='{tall:.1f}' "
+                f"fill='#3b6ea5'><title>{count:,} leaves of {size}{more}</title></rect>"
+            )
+        wide = width * len(counts)
+        return (
+            f"<svg width='{wide}' height='{height + 14}' role='img' aria-label='leaves by size'>"
+            f"{''.join(bars)}<text x='0' y='{height + 12}' font-size='10' fill='currentColor'>0</text>"
+            f"<text x='{wide - 1}' y='{height + 12}' font-size='10' fill='currentColor' text-anchor='end'>"
+            f"{len(counts) - 1} references in a leaf</text></svg>"
+        )
 
 
 def report_of(figures: dict[str, object]) -> Report:

@@ -14,10 +14,12 @@ from . import _ropewalk
 from ._arrays import (
     ArrayLike,
     as_array,
+    as_choice,
     as_faces,
     as_float32,
     as_float64,
     as_integer,
+    as_limit,
     as_masks,
     as_points,
     as_rows,
@@ -70,7 +72,10 @@ class Scene(Saved, PointMethods):
             rounding would move a vertex by more than 2^-20 of the mesh's diagonal.
         threads: threads of the build; 0 is one a processor that this process may use. The tree is the
             same for any number.
-        progress: True for a bar (where tqdm is installed), or a function of the share done.
+        progress: True for a bar (where tqdm is installed), or a function of the share done, which may raise to
+            stop the build.
+        memory_limit: bytes that the scene and its build may take beyond the arrays given. A build that needs
+            more is refused before it takes any; one that comes close gets a smaller tree.
 
     Faces without area are kept and never hit; both sides of others are. A scene without faces is
     valid, and every ray misses it.
@@ -78,7 +83,8 @@ class Scene(Saved, PointMethods):
     Raises:
         ArgumentError: wrong shapes, vertices that are not finite, faces that name none.
         ArgumentTypeError: arrays that are no real numbers, faces that are no integers.
-        OutOfMemoryError: the tree does not fit into memory.
+        OutOfMemoryError: the tree does not fit into memory, or into ``memory_limit``; the message says how
+            much it needs.
         KeyboardInterrupt: Ctrl-C stops a build within a fraction of a second.
 
     >>> import ropewalk
@@ -100,9 +106,10 @@ class Scene(Saved, PointMethods):
         precision: str = "auto",
         threads: int = 0,
         progress: bool | Callable[[float], object] | None = None,
+        memory_limit: int | None = None,
     ) -> None:
         mesh = _mesh(vertices, faces, "")
-        self._adopt(_build([mesh], [_ALL_BITS], preset, precision, threads, progress))
+        self._adopt(_build([mesh], [_ALL_BITS], preset, precision, threads, progress, memory_limit))
 
     @classmethod
     def from_meshes(
@@ -114,6 +121,7 @@ class Scene(Saved, PointMethods):
         precision: str = "auto",
         threads: int = 0,
         progress: bool | Callable[[float], object] | None = None,
+        memory_limit: int | None = None,
     ) -> Scene:
         """A scene of several meshes; hits name the mesh (``geom_id``) and the face in it (``prim_id``).
 
@@ -152,7 +160,9 @@ class Scene(Saved, PointMethods):
             checked.append(_mesh(vertices, faces, f"meshes[{i}]."))
         bits = [_ALL_BITS] * len(checked) if masks is None else _mesh_masks(masks, len(checked), "mesh")
         scene = cls.__new__(cls)
-        scene._adopt(_build(checked, bits, preset, precision, threads, progress))
+        scene._adopt(
+            _build(checked, bits, preset, precision, threads, progress, memory_limit)
+        )
         return scene
 
     @classmethod
@@ -258,6 +268,7 @@ class Scene(Saved, PointMethods):
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
         start: ArrayLike | Hits | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> Hits:
@@ -277,6 +288,9 @@ class Scene(Saved, PointMethods):
             start: cells from which the rays may be walked: ``hits.cell`` of the hits that they start at,
                 those hits, or ``walker.cell``. A hint for short rays, used where it pays: it changes no
                 answer, also if it is wrong.
+            faces: which sides are hit: ``"both"``, ``"front"``, the side from which vertices run
+                counter-clockwise, or ``"back"``; rays pass through the other one. Scenes of triangles alone
+                have a choice.
             threads: threads of this call; 0 is one a processor that this process may use.
             strict: refuse rays that can hit nothing, instead of counting them in a warning.
 
@@ -301,7 +315,7 @@ class Scene(Saved, PointMethods):
         False
         """
         rays, shape, threads = self._rays(
-            origins, directions, t_min, t_max, masks, skip, threads, strict
+            origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
         t, prim, geom, invalid, first = self._core.closest_hit(
             rays, threads, _cells(start, shape)
@@ -319,6 +333,7 @@ class Scene(Saved, PointMethods):
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
         start: ArrayLike | Hits | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> NDArray[np.bool_]:
@@ -332,7 +347,7 @@ class Scene(Saved, PointMethods):
         array([ True, False])
         """
         rays, shape, threads = self._rays(
-            origins, directions, t_min, t_max, masks, skip, threads, strict
+            origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
         hit, invalid, first = self._core.occluded(rays, threads, _cells(start, shape))
         _warn(invalid, first)
@@ -347,6 +362,7 @@ class Scene(Saved, PointMethods):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> HitLists:
@@ -365,7 +381,7 @@ class Scene(Saved, PointMethods):
         array([1., 2.], dtype=float32)
         """
         return self._lists(
-            None, origins, directions, t_min, t_max, masks, skip, threads, strict
+            None, origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
 
     def first_hits(
@@ -378,6 +394,7 @@ class Scene(Saved, PointMethods):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> HitLists:
@@ -392,7 +409,7 @@ class Scene(Saved, PointMethods):
         array([1.], dtype=float32)
         """
         k = as_integer(k, "k", 0, 2**63 - 1)
-        return self._lists(k, origins, directions, t_min, t_max, masks, skip, threads, strict)
+        return self._lists(k, origins, directions, t_min, t_max, masks, skip, faces, threads, strict)
 
     def count_hits(
         self,
@@ -403,6 +420,7 @@ class Scene(Saved, PointMethods):
         *,
         masks: ArrayLike | None = None,
         skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
         threads: int = 0,
         strict: bool = False,
     ) -> NDArray[np.int32]:
@@ -416,7 +434,7 @@ class Scene(Saved, PointMethods):
         array([2, 0], dtype=int32)
         """
         rays, shape, threads = self._rays(
-            origins, directions, t_min, t_max, masks, skip, threads, strict
+            origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
         counts, invalid, first = self._core.count_hits(rays, threads)
         _warn(invalid, first)
@@ -431,11 +449,12 @@ class Scene(Saved, PointMethods):
         t_max: ArrayLike,
         masks: ArrayLike | None,
         skip: Any,
+        faces: str,
         threads: int,
         strict: bool,
     ) -> HitLists:
         rays, shape, threads = self._rays(
-            origins, directions, t_min, t_max, masks, skip, threads, strict
+            origins, directions, t_min, t_max, masks, skip, faces, threads, strict
         )
         offsets, t, prim, geom, invalid, first = self._core.first_hits(rays, threads, k)
         _warn(invalid, first, stacklevel=4)
@@ -449,6 +468,7 @@ class Scene(Saved, PointMethods):
         t_max: ArrayLike,
         masks: ArrayLike | None,
         skip: Any,
+        faces: str,
         threads: int,
         strict: bool,
     ) -> tuple[Any, tuple[int, ...], int]:
@@ -464,6 +484,13 @@ class Scene(Saved, PointMethods):
         count = 1
         for length in shape:
             count *= length
+        sides = as_choice(faces, "faces", ("both", "front", "back"))
+        if sides != "both" and self._core.has_shapes:
+            # A sphere has a hit of each side, of which queries know the first.
+            raise ArgumentError(
+                f"faces: expected 'both' for a scene of other primitives than triangles, found {faces!r}",
+                "faces",
+            )
         double = isinstance(self._core, DoubleCore)
         kind, as_float = (DoubleRays, as_float64) if double else (Rays, as_float32)
         rays = kind(
@@ -474,6 +501,7 @@ class Scene(Saved, PointMethods):
             as_float(per_ray(as_array(t_max, "t_max"), shape, "t_max")),
             None if masks is None else per_ray(as_masks(masks, "masks"), shape, "masks"),
             None if skip is None else self._skip(skip, shape),
+            sides,
         )
         if strict and (index := rays.first_invalid()) is not None:
             reason = _why(o, d, t_min, t_max, shape, index, double)
@@ -607,6 +635,20 @@ class Scene(Saved, PointMethods):
         """What a notebook shows: the report as a table."""
         return f"<b>ropewalk.Scene</b>{self.report._repr_html_()}"
 
+    def plot(self) -> Any:
+        """A matplotlib figure: leaves by the number of their primitives, and what a line is predicted to
+        cost in them (scenes of triangles).
+
+        Raises:
+            ImportError: matplotlib is not installed (``pip install 'ropewalk[plot]'``).
+
+        >>> import ropewalk
+        >>> figure = ropewalk.load("spd:tetra:3").plot()  # doctest: +SKIP
+        """
+        from ._plot import plot
+
+        return plot(self)
+
     def __copy__(self) -> Scene:
         return self
 
@@ -630,6 +672,7 @@ def load(
     precision: str = "auto",
     threads: int = 0,
     progress: bool | Callable[[float], object] | None = None,
+    memory_limit: int | None = None,
 ) -> Scene:
     """Loads a scene: a mesh file as :func:`read_mesh` reads it (OBJ, PLY, STL, OFF, glTF), an NFF file,
     both gzipped or not, or a built-in scene, ``"spd:NAME"`` or ``"spd:NAME:SIZE"`` of the Standard
@@ -650,14 +693,22 @@ def load(
     name = as_path(path)
     mesh = _ropewalk.read_mesh(name)
     if mesh is not None:
-        return Scene(*mesh, preset=preset, precision=precision, threads=threads, progress=progress)
+        return Scene(
+            *mesh,
+            preset=preset,
+            precision=precision,
+            threads=threads,
+            progress=progress,
+            memory_limit=memory_limit,
+        )
     if precision == "double":
         raise ArgumentError(
             "precision: expected 'auto' or 'single' for NFF files and built-in scenes, found 'double'",
             "precision",
         )
     with _progress(progress) as show:
-        core = Core.load(name, _preset(preset), as_threads(threads), show)
+        limit = as_limit(memory_limit)
+        core = Core.load(name, _preset(preset), as_threads(threads), show, limit)
     scene = Scene.__new__(Scene)
     scene._adopt(core)
     return scene
@@ -705,8 +756,9 @@ def _build(
     precision: str,
     threads: int,
     progress: bool | Callable[[float], object] | None,
+    memory_limit: int | None,
 ) -> Core | DoubleCore:
-    preset, threads = _preset(preset), as_threads(threads)
+    preset, threads, limit = _preset(preset), as_threads(threads), as_limit(memory_limit)
     if precision not in ("auto", "single", "double"):
         raise ArgumentError(
             f"precision: expected 'auto', 'single' or 'double', found {precision!r}", "precision"
@@ -716,7 +768,7 @@ def _build(
     if precision == "auto":
         precision = "double" if any(by > _PRECISION * size for by, size in moved) else "single"
     if precision == "double" and sum(len(mesh[1]) for mesh in meshes) > 0:
-        return _build_double(meshes, masks, preset, threads, progress)
+        return _build_double(meshes, masks, preset, threads, progress, limit)
     for (by, size), (_, corners, name) in zip(moved, meshes):
         if len(corners) and _PRECISION * size < by < np.inf:
             warnings.warn(
@@ -727,7 +779,7 @@ def _build(
             )
     faces = [mesh[1] for mesh in meshes]
     with _progress(progress) as show:
-        return Core.build(vertices, faces, masks, preset, threads, show)
+        return Core.build(vertices, faces, masks, preset, threads, show, limit)
 
 
 def _build_double(
@@ -736,6 +788,7 @@ def _build_double(
     preset: str,
     threads: int,
     progress: bool | Callable[[float], object] | None,
+    limit: int | None,
 ) -> DoubleCore:
     vertices, faces, starts, first = [], [], [0], 0
     for given, corners, name in meshes:
@@ -759,7 +812,7 @@ def _build_double(
     one = len(meshes) == 1
     joined = (vertices[0], faces[0]) if one else (np.concatenate(vertices), np.concatenate(faces))
     with _progress(progress) as show:
-        return DoubleCore.build(*joined, starts, masks, preset, threads, show)
+        return DoubleCore.build(*joined, starts, masks, preset, threads, show, limit)
 
 
 def _preset(preset: str) -> str:

@@ -246,6 +246,35 @@ def test_skip(query):
 
 
 @pytest.mark.parametrize("query", QUERIES)
+def test_sides_that_are_none(query):
+    refused(ArgumentError, "faces", None, "'front'", lambda: ask(query, O, D, faces="inside"))
+    refused(ArgumentTypeError, "faces", None, "string", lambda: ask(query, O, D, faces=1))
+    balls = ropewalk.load("spd:balls:1")
+    refused(ArgumentError, "faces", None, "'both'", lambda: ask(query, O, D, faces="back", scene=balls))
+    ask(query, O, D, faces="both", scene=balls)
+
+
+def test_memory_limits():
+    vertices = np.random.default_rng(0).normal(size=(30_000, 3))
+    faces = np.arange(30_000).reshape(-1, 3)
+    build = lambda limit: ropewalk.Scene(vertices, faces, memory_limit=limit)  # noqa: E731
+    refused(ropewalk.OutOfMemoryError, "memory_limit", None, "needs about .* bytes", lambda: build(10_000))
+    refused(ArgumentError, "memory_limit", None, "found -1", lambda: build(-1))
+    refused(ArgumentTypeError, "memory_limit", None, "integer", lambda: build(1e9))
+    meshes = [(vertices, faces)] * 2
+    with pytest.raises(MemoryError):
+        ropewalk.Scene.from_meshes(meshes, memory_limit=2**20)
+    with pytest.raises(MemoryError):
+        ropewalk.load("spd:tetra:6", memory_limit=2**16)
+    free, tight = build(None), build(2_400_000)
+    assert build(2**40).report.tree_bytes == free.report.tree_bytes
+    assert tight.report.tree_bytes + tight.report.geometry_bytes <= 2_400_000
+    assert tight.report.duplication < free.report.duplication
+    o, d = np.random.default_rng(1).normal(size=(2, 5000, 3))
+    np.testing.assert_array_equal(tight.closest_hit(o, d).t, free.closest_hit(o, d).t)
+
+
+@pytest.mark.parametrize("query", QUERIES)
 def test_threads(query):
     refused(ArgumentError, "threads", None, "0 to", lambda: ask(query, O, D, threads=-1))
     refused(ArgumentError, "threads", None, "0 to", lambda: ask(query, O, D, threads=10**6))

@@ -103,6 +103,28 @@ def test_meshes_masks_and_skip():
     assert (again.geom_id, again.prim_id) == (1, 0)
 
 
+def test_sides():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]]) / 3 + 1e7
+    scene = ropewalk.Scene(vertices, [[0, 1, 2], [0, 2, 1]])
+    o, d = vertices.mean(axis=0) + [0, 0, 2], [0, 0, -1]
+    assert scene.all_hits(o, d, faces="front").prim_id.tolist() == [0]
+    assert scene.all_hits(o, d, faces="back").prim_id.tolist() == [1]
+    assert scene.closest_hit(o, d, faces="back").prim_id == 1
+    mirror = np.diag([1.0, 1.0, -1.0, 1.0])
+    placed = ropewalk.Scene.from_instances([(scene, mirror)])
+    for faces in ("front", "back"):
+        hits = placed.all_hits(o, d, faces=faces)
+        assert (np.sign(hits.normal @ d) == (-1 if faces == "front" else 1)).all() and len(hits) == 1
+
+
+def test_the_memory_limit():
+    vertices = np.random.default_rng(1).uniform(0, 1, (3000, 3)) + 1e7
+    faces = np.arange(3000).reshape(1000, 3)
+    with pytest.raises(ropewalk.OutOfMemoryError, match="memory_limit"):
+        ropewalk.Scene(vertices, faces, memory_limit=200_000)
+    assert ropewalk.Scene(vertices, faces, memory_limit=2_000_000).precision == "double"
+
+
 def test_threads_and_pickles_change_nothing():
     scene, origins, directions, _ = case(random_mesh, 10.0, 1e7)
     origins, directions = np.tile(origins, (4, 1)), np.tile(directions, (4, 1))

@@ -169,6 +169,29 @@ def test_skip(make):
     )
 
 
+@pytest.mark.parametrize("make", MESHES)
+@pytest.mark.parametrize("faces", ["front", "back"])
+def test_sides(make, faces):
+    scene, origins, directions, oracle = case(make, 1.0, seed=3)
+    rng = np.random.default_rng([MESHES.index(make), 9, 3])
+    corners, indices = make(rng, COUNT, 1.0)
+    a, b, c = np.moveaxis(corners[indices].astype(float), 1, 0)
+    towards = directions.astype(float) @ np.cross(b - a, c - a).T
+    oracle.only(towards < 0 if faces == "front" else towards > 0)
+    t, prim = oracle.closest()
+    hits = scene.closest_hit(origins, directions, faces=faces)
+    np.testing.assert_array_equal(hits.t, t)
+    np.testing.assert_array_equal(hits.prim_id, prim)
+    np.testing.assert_array_equal(scene.occluded(origins, directions, faces=faces), prim >= 0)
+    np.testing.assert_array_equal(scene.count_hits(origins, directions, faces=faces), oracle.hit.sum(1))
+    found = scene.all_hits(origins, directions, faces=faces)
+    np.testing.assert_array_equal(found.t, [t for row in oracle.lists() for t, _ in row])
+    towards = np.einsum("ij,ij->i", found.normal, directions[found.ray_id])
+    assert (towards < 1e-6 if faces == "front" else towards > -1e-6).all()
+    one = scene.closest_hit(origins[0], directions[0], faces=faces)
+    assert one.t == t[0]
+
+
 def test_meshes_number_their_own_primitives():
     rng = np.random.default_rng(3)
     a, b, c = random_mesh(rng, 70, 1.0), random_mesh(rng, 1, 1.0), random_mesh(rng, 40, 1.0)

@@ -6,6 +6,8 @@ import importlib
 import inspect
 import pathlib
 import re
+import sys
+import xml.etree.ElementTree
 
 import numpy as np
 import pytest
@@ -115,6 +117,29 @@ def test_queries_have_an_example(query):
     assert ">>>" in getattr(ropewalk.Scene, query).__doc__
 
 
+def test_pictures(tmp_path):
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    vertices, faces = random_mesh(np.random.default_rng(0), 3000, 1.0)
+    scene = ropewalk.Scene(vertices, faces)
+    report = scene.report
+    figure = scene.plot()
+    left, right = figure.axes
+    assert sum(bar.get_height() for bar in left.patches) == report.leaves
+    tests = sum(bar.get_height() for bar in right.patches)
+    assert abs(tests - report.predicted_tests) < 1e-3 * tests
+    figure.savefig(tmp_path / "a.png")
+    others = [ropewalk.load("spd:balls:2"), ropewalk.Scene([], []), ropewalk.Scene(vertices[:3], [[0, 1, 2]])]
+    for other in others:
+        other.plot().savefig(tmp_path / "b.png")
+
+
+def test_pictures_without_matplotlib(monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+    with pytest.raises(ImportError, match=r"ropewalk\[plot\]"):
+        ropewalk.Scene([], []).plot()
+
+
 def test_reports_show_themselves():
     scene = ropewalk.load("spd:gears:1")
     report = scene.report
@@ -122,6 +147,9 @@ def test_reports_show_themselves():
     assert report.duplication >= 1 and report.predicted_steps > 1 and report.predicted_tests > 1
     assert sum(report.leaf_sizes) == report.leaves
     assert "duplication" in str(report) and "<table>" in report._repr_html_()
+    assert report._repr_html_().count("<rect") >= 9
+    xml.etree.ElementTree.fromstring(f"<div>{scene._repr_html_()}</div>")
+    assert "table" in ropewalk.Scene([], [])._repr_html_()
     assert "<table>" in scene._repr_html_() and "primitives" in repr(scene)
     assert ropewalk.simd_level() in ("scalar", "avx2", "avx512")
     assert ropewalk.default_threads() >= 1 and ropewalk.__version__

@@ -12,9 +12,10 @@ use pyo3::types::PyDict;
 use ropewalk::build::{BuildSettings, Monitor, Preset};
 use ropewalk::kernel::{AllHits, BatchCaster, HitFilter};
 use ropewalk::point::Cell;
-use ropewalk::primitive::Triangle;
+use ropewalk::primitive::{Primitive, Triangle};
+use ropewalk::ray::PreparedRay;
 use ropewalk::wide::WideTree;
-use ropewalk::{Geometry, GeometryError, Hit, Ray, Sides};
+use ropewalk::{Geometry, GeometryError, Hit, Ray, Shape, Sides};
 use ropewalk_scene::{FacetPolicy, NffLimits, load_scene};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -93,7 +94,7 @@ type Rows<'py> = (
 impl Core {
     /// Builds a tree over meshes: vertices, faces and a mask of each.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, masks, preset, threads, progress=None))]
+    #[pyo3(signature = (vertices, faces, masks, preset, threads, progress=None, memory_limit=None))]
     fn build(
         py: Python<'_>,
         vertices: Vec<PyReadonlyArray2<'_, f32>>,
@@ -102,6 +103,7 @@ impl Core {
         preset: &str,
         threads: usize,
         progress: Option<Py<PyAny>>,
+        memory_limit: Option<u64>,
     ) -> PyResult<Core> {
         let one_mesh = vertices.len() == 1;
         let mut meshes = Vec::with_capacity(vertices.len());
@@ -110,19 +112,24 @@ impl Core {
             let (faces, _) = faces.as_slice()?.as_chunks::<3>();
             meshes.push((vertices, faces));
         }
+        // Before the triangles are copied; of is asked again, which costs nothing.
+        let count: usize = meshes.iter().map(|mesh| mesh.1.len()).sum();
+        left_for_build(memory_limit, 0, count)
+            .map_err(|failure| failure.into_exception(one_mesh))?;
         let make = || triangles(&meshes);
-        Self::of(py, make, masks, preset, threads, progress, one_mesh)
+        Self::of(py, make, masks, preset, threads, progress, memory_limit, one_mesh)
     }
 
     /// Loads a scene file or a built-in scene, object by object as primitives of one mesh.
     #[staticmethod]
-    #[pyo3(signature = (path, preset, threads, progress=None))]
+    #[pyo3(signature = (path, preset, threads, progress=None, memory_limit=None))]
     fn load(
         py: Python<'_>,
         path: &str,
         preset: &str,
         threads: usize,
         progress: Option<Py<PyAny>>,
+        memory_limit: Option<u64>,
     ) -> PyResult<Core> {
         let make = || {
             let scene = load_scene(path, &NffLimits::default()).map_err(Failure::File)?;
@@ -130,7 +137,7 @@ impl Core {
             let count = geometry.len() as u32;
             Ok((geometry, vec![0, count]))
         };
-        Self::of(py, make, vec![!0], preset, threads, progress, true)
+        Self::of(py, make, vec![!0], preset, threads, progress, memory_limit, true)
     }
 
     /// Builds what [`Core::state`] returned.
@@ -152,7 +159,7 @@ impl Core {
             && starts.first() == Some(&0)
             && starts.last().is_some_and(|&n| n as usize == kinds.len());
         let geometry = state::read(kinds, ends, numbers).filter(|_| sound).ok_or_else(bad)?;
-        Self::of(py, || Ok((geometry, starts)), masks, preset, threads, None, true)
+        Self::of(py, || Ok((geometry, starts)), masks, preset, threads, None, None, true)
     }
 
     /// Everything that makes the scene, as arrays and lists.
@@ -184,6 +191,12 @@ impl Core {
     #[getter]
     fn masks(&self) -> Vec<u32> {
         self.masks.clone()
+    }
+
+    /// True if there are other primitives than triangles.
+    #[getter]
+    fn has_shapes(&self) -> bool {
+        self.tree.has_shapes()
     }
 
     /// Lower and upper corner of the box of everything.
@@ -443,6 +456,7 @@ impl Core {
         preset: &str,
         threads: usize,
         progress: Option<Py<PyAny>>,
+        memory_limit: Option<u64>,
         one_mesh: bool,
     ) -> PyResult<Core> {
         let preset = self::preset(preset)?;
@@ -459,6 +473,8 @@ impl Core {
         let job = || {
             let (geometry, starts) = make()?;
             let watch = Watch { stop: &stop, done: &done };
+            let memory_limit = left_for_build(memory_limit, 0, geometry.len())?;
+            let settings = BuildSettings { memory_limit, ..settings.clone() };
             let (tree, report) =
                 WideTree::build(&geometry, &settings, &watch).map_err(Failure::Build)?;
             Ok((geometry, starts, tree, report))
@@ -510,11 +526,14 @@ impl Core {
             static RAYS: RefCell<Vec<Ray>> = const { RefCell::new(Vec::new()) };
         }
         let masks = masks_that_refuse(&self.masks, view.masks, &range);
-        let filter = (masks.is_some() || view.skip.is_some()).then_some(RayFilter {
+        let sides = (view.sides != Sides::Both).then_some(view);
+        let is_plain = masks.is_none() && view.skip.is_none() && sides.is_none();
+        let filter = (!is_plain).then_some(RayFilter {
             first: range.start,
             core: self,
             masks,
             skip: view.skip,
+            sides: sides.copied(),
         });
         RAYS.with_borrow_mut(|rays| {
             let invalid = view.interleave(range, rays);
@@ -525,12 +544,14 @@ impl Core {
     }
 }
 
-/// Masks of rays and meshes, and a primitive a ray that does not count.
+/// Masks of rays and meshes, a primitive a ray that does not count, and sides.
 struct RayFilter<'a> {
     first: usize,
     core: &'a Core,
     masks: Option<&'a [u32]>,
     skip: Option<&'a [u32]>,
+    /// The rays, where only one side of primitives is hit.
+    sides: Option<View<'a>>,
 }
 
 impl HitFilter for RayFilter<'_> {
@@ -543,6 +564,13 @@ impl HitFilter for RayFilter<'_> {
                 // An altered file may name primitives that are not there.
                 let mesh = core.masks.get(mesh(&core.starts, hit.prim_id));
                 one(masks, ray) & mesh.copied().unwrap_or(!0) != 0
+            })
+            && self.sides.is_none_or(|view| {
+                // The test of brute force, for one side: the same signs decide.
+                let (origin, dir) = view.line(ray);
+                let ray = PreparedRay::new(&Ray { origin, dir, t_min: hit.t, t_max: hit.t });
+                let shape = core.geometry.shape(hit.prim_id);
+                ray.is_some_and(|ray| shape.intersect(&ray, view.sides).is_some())
             })
     }
 }
@@ -631,6 +659,18 @@ pub fn number(starts: &[u32], prim: &mut [u32], geom: &mut [i32]) {
         *prim -= starts[mesh];
         *geom = mesh as i32;
     }
+}
+
+/// What a limit leaves for a build beyond the geometry itself.
+pub fn left_for_build(
+    limit: Option<u64>,
+    kept: u64,
+    primitives: usize,
+) -> Result<Option<u64>, Failure> {
+    let Some(limit) = limit else { return Ok(None) };
+    let geometry = kept + (primitives * (size_of::<Shape>() + size_of::<Sides>())) as u64;
+    let needed = geometry + ropewalk::build::estimated_bytes(primitives, 1.0);
+    if needed > limit { Err(Failure::Memory { needed, limit }) } else { Ok(Some(limit - geometry)) }
 }
 
 /// The triangles of some meshes.

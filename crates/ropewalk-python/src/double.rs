@@ -1,15 +1,16 @@
 //! Scenes in `f64`, of meshes or of instances, and the batch queries: what [`Core`](crate::core::Core) is in
 //! `f32`.
 
-use crate::core::{Watch, blocks, checked, split, total, zeros};
+use crate::core::{Watch, blocks, checked, left_for_build, split, total, zeros};
 use crate::error::{self, Failure};
 use crate::figures::Build;
-use crate::rays::{Invalid, one};
+use crate::rays::{Invalid, one, sides};
 use crate::surface::Surface;
 use crate::work;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use ropewalk::Sides;
 use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::double::{
     DoubleAllHits, DoubleCaster, DoubleFilter, DoubleGeometry, DoubleHit, DoubleRay,
@@ -35,13 +36,14 @@ pub struct DoubleRays {
     t_max: Py<PyArray1<f64>>,
     masks: Option<Py<PyArray1<u32>>>,
     skip: Option<Py<PyArray1<i32>>>,
+    sides: Sides,
 }
 
 #[pymethods]
 impl DoubleRays {
     /// Arrays must be contiguous: three numbers a ray in `origins` and `directions`, one in the others.
     #[new]
-    #[pyo3(signature = (count, origins, directions, t_min, t_max, masks=None, skip=None))]
+    #[pyo3(signature = (count, origins, directions, t_min, t_max, masks=None, skip=None, faces="both"))]
     fn new(
         py: Python<'_>,
         count: usize,
@@ -51,8 +53,10 @@ impl DoubleRays {
         t_max: Py<PyArray1<f64>>,
         masks: Option<Py<PyArray1<u32>>>,
         skip: Option<Py<PyArray1<i32>>>,
+        faces: &str,
     ) -> PyResult<DoubleRays> {
-        let rays = DoubleRays { count, origins, directions, t_min, t_max, masks, skip };
+        let sides = sides(faces)?;
+        let rays = DoubleRays { count, origins, directions, t_min, t_max, masks, skip, sides };
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;
         let fits = |len: usize, each: usize| {
@@ -100,6 +104,7 @@ impl DoubleRays {
             t_max: read(py, &self.t_max)?,
             masks: self.masks.as_ref().map(|masks| read(py, masks)).transpose()?,
             skip: self.skip.as_ref().map(|skip| read(py, skip)).transpose()?,
+            sides: self.sides,
         })
     }
 }
@@ -113,6 +118,7 @@ struct Borrowed<'py> {
     t_max: PyReadonlyArray1<'py, f64>,
     masks: Option<PyReadonlyArray1<'py, u32>>,
     skip: Option<PyReadonlyArray1<'py, i32>>,
+    sides: Sides,
 }
 
 impl Borrowed<'_> {
@@ -127,6 +133,7 @@ impl Borrowed<'_> {
             t_max: self.t_max.as_slice()?,
             masks,
             skip: skip.map(bytemuck::cast_slice),
+            sides: self.sides,
         })
     }
 }
@@ -142,6 +149,8 @@ struct View<'a> {
     masks: Option<&'a [u32]>,
     /// Primitives to ignore, numbered through all meshes; `u32::MAX` is none.
     skip: Option<&'a [u32]>,
+    /// The sides of triangles that are hit.
+    sides: Sides,
 }
 
 impl View<'_> {
@@ -214,7 +223,7 @@ impl DoubleCore {
     /// Builds a tree over the vertices and faces of all meshes one after another; `starts` are the first
     /// face of each mesh and the number of faces.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, starts, masks, preset, threads, progress=None))]
+    #[pyo3(signature = (vertices, faces, starts, masks, preset, threads, progress=None, memory_limit=None))]
     fn build(
         py: Python<'_>,
         vertices: PyReadonlyArray2<'_, f64>,
@@ -224,6 +233,7 @@ impl DoubleCore {
         preset: &str,
         threads: usize,
         progress: Option<Py<PyAny>>,
+        memory_limit: Option<u64>,
     ) -> PyResult<DoubleCore> {
         let preset = crate::core::preset(preset)?;
         let sound = starts.len() == masks.len() + 1 && starts.is_sorted();
@@ -244,6 +254,10 @@ impl DoubleCore {
             None => Ok(()),
         };
         let job = || {
+            // The scene keeps vertices and faces; the build works on triangles of its own.
+            let kept = size_of_val(vertices) + size_of_val(faces);
+            let memory_limit = left_for_build(memory_limit, kept as u64, faces.len())?;
+            let settings = BuildSettings { memory_limit, ..settings.clone() };
             let geometry = DoubleGeometry::from_triangles(vertices.to_vec(), faces.to_vec())
                 .map_err(Failure::Double)?;
             let watch = Watch { stop: &stop, done: &done };
@@ -325,6 +339,12 @@ impl DoubleCore {
     #[getter]
     fn masks(&self) -> Vec<u32> {
         self.masks.clone()
+    }
+
+    /// True if anything but triangles is in the scene.
+    #[getter]
+    fn has_shapes(&self) -> bool {
+        false
     }
 
     /// Name of the preset.
@@ -623,41 +643,64 @@ impl DoubleCore {
     /// A filter, where any ray of the range may have hits that do not count.
     fn filter<'a>(&'a self, view: &View<'a>, range: &Range<usize>) -> Option<RayFilter<'a>> {
         let masks = crate::core::masks_that_refuse(&self.masks, view.masks, range);
-        (masks.is_some() || view.skip.is_some()).then_some(RayFilter {
-            first: range.start,
-            core: self,
-            masks,
-            skip: view.skip,
-        })
+        let is_plain = masks.is_none() && view.skip.is_none() && view.sides == Sides::Both;
+        (!is_plain).then_some(RayFilter { first: range.start, core: self, masks, view: *view })
     }
 }
 
-/// Masks of rays and meshes, and a primitive a ray that does not count.
+/// Masks of rays and meshes, a primitive a ray that does not count, and sides.
 struct RayFilter<'a> {
     first: usize,
     core: &'a DoubleCore,
     masks: Option<&'a [u32]>,
-    skip: Option<&'a [u32]>,
+    view: View<'a>,
 }
 
 impl RayFilter<'_> {
     fn accepts_mesh(&self, ray: usize, mesh: usize) -> bool {
         self.masks.is_none_or(|masks| one(masks, ray) & self.core.masks[mesh] != 0)
     }
+
+    /// Whether the primitive, numbered through all meshes, is not the one that the ray ignores.
+    fn counts(&self, ray: usize, prim: u32) -> bool {
+        self.view.skip.is_none_or(|skip| one(skip, ray) != prim)
+    }
+
+    /// Whether the ray, moved into the space of the triangles, hits one on a side that counts.
+    fn meets(
+        &self,
+        ray: usize,
+        (prim, t): (u32, f64),
+        geometry: &DoubleGeometry,
+        place: impl Fn(&DoubleRay) -> DoubleRay,
+    ) -> bool {
+        let sides = self.view.sides;
+        sides == Sides::Both || {
+            let ray = place(&self.view.ray(ray)).with_range(t, t);
+            geometry.intersect_on(prim, &ray, sides).is_some()
+        }
+    }
 }
 
 impl DoubleFilter for RayFilter<'_> {
     fn accepts(&self, ray: usize, hit: &DoubleHit) -> bool {
         let ray = self.first + ray;
-        self.skip.is_none_or(|skip| one(skip, ray) != hit.prim_id)
+        let Held::Meshes(object, _) = &self.core.held else { return true };
+        self.counts(ray, hit.prim_id)
             && self.accepts_mesh(ray, crate::core::mesh(&self.core.starts, hit.prim_id))
+            && self.meets(ray, (hit.prim_id, hit.t), &object.geometry, |ray| *ray)
     }
 }
 
 impl InstanceFilter for RayFilter<'_> {
     fn accepts(&self, ray: usize, hit: &InstanceHit) -> bool {
-        let prim = self.core.starts[hit.instance as usize] + hit.prim_id;
-        self.skip.is_none_or(|skip| one(skip, self.first + ray) != prim)
+        let ray = self.first + ray;
+        let Held::Instances(scene) = &self.core.held else { return true };
+        let placed = &scene.instances()[hit.instance as usize];
+        self.counts(ray, self.core.starts[hit.instance as usize] + hit.prim_id)
+            && self.meets(ray, (hit.prim_id, hit.t), &placed.object.geometry, |ray| {
+                placed.transform.ray_to_object(ray)
+            })
     }
 
     fn visits(&self, ray: usize, instance: u32) -> bool {

@@ -59,6 +59,13 @@ pub enum Failure {
     Double(DoubleGeometryError),
     /// The tree cannot be built.
     Build(BuildError),
+    /// The scene does not fit into its memory limit.
+    Memory {
+        /// Bytes needed at least.
+        needed: u64,
+        /// The limit.
+        limit: u64,
+    },
     /// The file cannot be read.
     File(SceneError),
     /// The objects of a file cannot be used.
@@ -93,11 +100,20 @@ impl Failure {
                 }
             }
             Failure::Double(error) => argument("vertices", None, error.to_string()),
+            Failure::Memory { needed, limit } => {
+                let message = format!(
+                    "memory_limit: the scene needs about {needed} bytes at least, {limit} are allowed"
+                );
+                raise("OutOfMemoryError", message, Some("memory_limit"), None)
+            }
             Failure::Build(error) => match &error {
                 BuildError::Compile(
                     CompileError::Memory { .. } | CompileError::TooLarge { .. },
                 )
                 | BuildError::TooLarge { .. } => memory(error.to_string()),
+                BuildError::Memory { .. } => {
+                    raise("OutOfMemoryError", error.to_string(), Some("memory_limit"), None)
+                }
                 BuildError::Setting { field, .. } => argument(field, None, error.to_string()),
                 _ => other(error.to_string()),
             },

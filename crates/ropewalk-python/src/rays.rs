@@ -3,7 +3,7 @@
 use crate::error;
 use numpy::{Element, PyArray1, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
-use ropewalk::Ray;
+use ropewalk::{Ray, Sides};
 use std::ops::Range;
 
 /// A batch of rays: arrays with one entry a ray, or with one for all of them.
@@ -16,13 +16,14 @@ pub struct Rays {
     t_max: Py<PyArray1<f32>>,
     masks: Option<Py<PyArray1<u32>>>,
     skip: Option<Py<PyArray1<i32>>>,
+    sides: Sides,
 }
 
 #[pymethods]
 impl Rays {
     /// Arrays must be contiguous: three numbers a ray in `origins` and `directions`, one in the others.
     #[new]
-    #[pyo3(signature = (count, origins, directions, t_min, t_max, masks=None, skip=None))]
+    #[pyo3(signature = (count, origins, directions, t_min, t_max, masks=None, skip=None, faces="both"))]
     fn new(
         py: Python<'_>,
         count: usize,
@@ -32,8 +33,10 @@ impl Rays {
         t_max: Py<PyArray1<f32>>,
         masks: Option<Py<PyArray1<u32>>>,
         skip: Option<Py<PyArray1<i32>>>,
+        faces: &str,
     ) -> PyResult<Rays> {
-        let rays = Rays { count, origins, directions, t_min, t_max, masks, skip };
+        let sides = sides(faces)?;
+        let rays = Rays { count, origins, directions, t_min, t_max, masks, skip, sides };
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;
         let fits = |len: usize, each: usize| {
@@ -70,6 +73,7 @@ impl Rays {
     pub fn borrow<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py>> {
         Ok(Borrowed {
             count: self.count,
+            sides: self.sides,
             origins: borrow(py, &self.origins)?,
             directions: borrow(py, &self.directions)?,
             t_min: borrow(py, &self.t_min)?,
@@ -90,6 +94,7 @@ fn borrow<'py, T: Element>(
 /// Borrowed arrays.
 pub struct Borrowed<'py> {
     count: usize,
+    sides: Sides,
     origins: PyReadonlyArray1<'py, f32>,
     directions: PyReadonlyArray1<'py, f32>,
     t_min: PyReadonlyArray1<'py, f32>,
@@ -105,6 +110,7 @@ impl Borrowed<'_> {
         let skip = self.skip.as_ref().map(|skip| skip.as_slice()).transpose()?;
         Ok(View {
             count: self.count,
+            sides: self.sides,
             origins: self.origins.as_slice()?,
             directions: self.directions.as_slice()?,
             t_min: self.t_min.as_slice()?,
@@ -120,6 +126,8 @@ impl Borrowed<'_> {
 pub struct View<'a> {
     /// How many rays.
     pub count: usize,
+    /// The sides of primitives that are hit.
+    pub sides: Sides,
     origins: &'a [f32],
     directions: &'a [f32],
     t_min: &'a [f32],
@@ -178,6 +186,19 @@ impl View<'_> {
             ray
         }));
         invalid
+    }
+}
+
+/// The sides of a name.
+pub fn sides(faces: &str) -> PyResult<Sides> {
+    match faces {
+        "both" => Ok(Sides::Both),
+        "front" => Ok(Sides::Front),
+        "back" => Ok(Sides::Back),
+        _ => {
+            let message = format!("faces is '{faces}'; expected both, front or back");
+            Err(error::argument("faces", None, message))
+        }
     }
 }
 

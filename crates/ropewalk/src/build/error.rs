@@ -27,6 +27,14 @@ pub enum BuildError {
         /// The limit.
         max: u32,
     },
+    /// More memory than [`BuildSettings::memory_limit`](super::BuildSettings::memory_limit) allows.
+    #[error("the build needs {needed} bytes beyond its geometry; memory_limit allows {limit}")]
+    Memory {
+        /// Bytes needed: an estimate before the build, the exact number at its end.
+        needed: u64,
+        /// The limit.
+        limit: u64,
+    },
     /// The binary tree cannot be compiled to a wide tree.
     #[error(transparent)]
     Compile(#[from] crate::wide::CompileError),

@@ -10,6 +10,7 @@ mod error;
 mod event;
 mod fragment;
 mod late_cutting;
+pub(crate) mod memory;
 mod monitor;
 mod plane;
 mod report;
@@ -20,6 +21,7 @@ mod subtree;
 
 pub use blockage::EstimatorStats;
 pub use error::BuildError;
+pub use memory::estimated_bytes;
 pub use monitor::Monitor;
 pub use report::{BuildReport, StopCounts};
 pub use settings::{BuildSettings, Measure, Preset, Termination, TerminationEstimator};

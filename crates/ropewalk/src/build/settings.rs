@@ -171,6 +171,11 @@ pub struct BuildSettings {
     /// Width by which all primitives are thickened on every side, so that cells also refer to those that
     /// pass by them so closely: for geometry that has been rounded. 0 is off.
     pub margin: f32,
+    /// Bytes that a build for the wide tree may take beyond its geometry. One that needs more by
+    /// [`estimated_bytes`](super::estimated_bytes) without any duplication is refused before it begins; others get
+    /// no more references than fit, and what the tree takes is checked again, exactly, before it is
+    /// laid out. The tree depends on the limit, as on any setting. `None` is no limit.
+    pub memory_limit: Option<u64>,
     /// Threads; 0 is one per core. The tree is the same for any number.
     pub threads: usize,
 }
@@ -191,6 +196,7 @@ impl Default for BuildSettings {
             max_duplication: 32.0,
             binned_from: usize::MAX,
             margin: 0.0,
+            memory_limit: None,
             threads: 0,
         }
     }

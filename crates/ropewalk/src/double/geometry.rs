@@ -171,13 +171,21 @@ impl DoubleGeometry {
     /// # Panics
     /// If `prim_id` is out of range.
     pub fn intersect(&self, prim_id: u32, ray: &DoubleRay) -> Option<DoubleHit> {
+        self.intersect_on(prim_id, ray, Sides::Both)
+    }
+
+    /// The same on some sides alone.
+    ///
+    /// # Panics
+    /// If `prim_id` is out of range.
+    pub fn intersect_on(&self, prim_id: u32, ray: &DoubleRay, sides: Sides) -> Option<DoubleHit> {
         if !ray.is_valid() {
             return None;
         }
         let [a, b, c] = self.faces[prim_id as usize];
         let corner = |i: usize, axis: usize| self.vertices[[a, b, c][i] as usize][axis];
         let frame = Shear::along(&ray.origin, &ray.dir);
-        let met = Triangle::meet(corner, &frame, Sides::Both)?;
+        let met = Triangle::meet(corner, &frame, sides)?;
         let accepted = met.t.is_finite() && ray.t_min <= met.t && met.t <= ray.t_max;
         // Points on one line can enclose a ray only by rounding.
         (accepted && !self.is_degenerate(prim_id)).then_some(DoubleHit {

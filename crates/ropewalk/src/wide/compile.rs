@@ -37,9 +37,22 @@ impl WideTree {
         monitor: &dyn Monitor,
     ) -> Result<(WideTree, BuildReport), BuildError> {
         let start = Instant::now();
-        let settings = settings.effective()?;
+        let mut settings = settings.effective()?;
+        if let Some(limit) = settings.memory_limit {
+            settings.max_duplication =
+                build::memory::duplication_within(limit, geometry.len(), settings.max_duplication)?;
+        }
         build::in_pool(settings.threads, || {
             let (tree, mut report) = build::build_here(geometry, &settings, monitor)?;
+            if let Some(limit) = settings.memory_limit {
+                let (treelets, blocks) = count(&tree);
+                // The binary tree is still there while the wide one is filled from runs of 12 bytes.
+                let wide = (1 + treelets + blocks * BLOCK_LINES) * LINE;
+                let needed = (wide + report.tree.bytes + blocks * size_of::<Run>()) as u64;
+                if needed > limit {
+                    return Err(BuildError::Memory { needed, limit });
+                }
+            }
             let parallel = settings.threads != 1;
             let wide = Self::compile_with(&tree, geometry, parallel, is_left_out)?;
             report.seconds = start.elapsed().as_secs_f64();
