@@ -7,7 +7,6 @@ thread CPU time of the process counts, since machines are shared; with more the 
 from __future__ import annotations
 
 import argparse
-import gzip
 import pathlib
 import statistics
 import time
@@ -24,28 +23,9 @@ POINTS = 1 << 16
 FEW_CHORDS = 1 << 12
 
 
-def read_ply(path):
-    """Vertices and faces of a PLY file of triangles, ASCII or little-endian."""
-    raw = (gzip.open if path.suffix == ".gz" else open)(path, "rb").read()
-    end = raw.index(b"end_header\n") + len(b"end_header\n")
-    words = [line.split() for line in raw[:end].decode().splitlines()]
-    counts = {w[1]: int(w[2]) for w in words if w[0] == "element"}
-    vertices, faces = counts["vertex"], counts["face"]
-    columns = sum(w[0] == "property" and w[1] != "list" for w in words)
-    if b"format ascii" in raw[:end]:
-        numbers = np.array(raw[end:].split(), np.float64)
-        points = numbers[: vertices * columns].reshape(vertices, columns)[:, :3]
-        rows = numbers[vertices * columns :].reshape(faces, 4)
-        return np.float32(points), np.int32(rows[:, 1:])
-    points = np.frombuffer(raw, "<f4", vertices * columns, end).reshape(vertices, columns)
-    row = np.dtype([("n", "u1"), ("i", "<i4", 3)])
-    indices = np.frombuffer(raw, row, faces, end + points.nbytes)["i"]
-    return points[:, :3].astype(np.float32), indices.astype(np.int32)
-
-
 def view(name, arguments, low, high):
     """Eye, point looked at and view angle."""
-    if name == "bunny":
+    if not (arguments.generated / f"{name}.cam").exists():
         center, diagonal = (low + high) / 2, np.linalg.norm(high - low)
         along = np.array([0.3, 0.4, 1.0])
         return center + along / np.linalg.norm(along) * 0.9 * diagonal, center, 45.0
@@ -292,8 +272,10 @@ def main():
     print(f"ropewalk {ropewalk.__version__}, {ropewalk.simd_level()}, {arguments.threads} threads, "
           f"medians of {arguments.rounds} rounds; millions of rays a second")
     for name in arguments.scenes.split(","):
-        file = arguments.generated / f"{name}.ply"
-        vertices, faces = read_ply(arguments.data / "mesh/bunny.ply.gz" if name == "bunny" else file)
+        file = arguments.data / f"mesh/{name}.ply.gz"
+        file = file if file.exists() else arguments.generated / f"{name}.ply"
+        vertices, faces = ropewalk.read_mesh(file)
+        vertices, faces = np.float32(vertices), np.int32(faces)
         scene = ropewalk.Scene(vertices, faces)
         rng = np.random.default_rng(1)
         if arguments.points:

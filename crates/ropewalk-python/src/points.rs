@@ -9,10 +9,10 @@ use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
 /// Points of a task: some tenths of a second at most, so that Ctrl-C is heard.
-const BLOCK: usize = 1 << 15;
+const BLOCK: usize = 1 << 14;
 
 /// The same where a point may take a tenth of a millisecond.
-const SLOW_BLOCK: usize = 1 << 11;
+const SLOW_BLOCK: usize = 1 << 13;
 
 /// The fewest points of a task where several threads share a batch.
 const MIN_BLOCK: usize = 512;

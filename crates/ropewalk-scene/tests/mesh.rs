@@ -291,6 +291,11 @@ fn errors_say_where_and_what() {
             ascii.replace("3 0 3 2", "9e9 0 3 2"),
             "line 19: expected the length of a list, within the file",
         ),
+        (
+            Ply,
+            ascii.replace("vertex 4", "ver\u{0}tex 400000"),
+            "line 4: expected 400000 of element ver\\u{0}tex, found",
+        ),
         (Stl, stl.replace("vertex 1 0 0", "vertex 1 0 z"), "expected z, found \"z\""),
         (
             Stl,

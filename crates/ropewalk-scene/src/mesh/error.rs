@@ -86,16 +86,24 @@ pub(super) fn wrong(
     expected: impl Into<String>,
     found: impl fmt::Display,
 ) -> MeshError {
-    let text = found.to_string();
-    // Control characters, and whatever else a terminal might not like, are escaped.
-    let mut found: String = text
-        .chars()
-        .take(QUOTED_CHARS)
-        .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
-        .collect();
-    if text.chars().nth(QUOTED_CHARS).is_some() {
-        found.push_str("...");
+    // Names of the file's own stand in what is expected too.
+    let expected = printable(&expected.into(), 3 * QUOTED_CHARS);
+    let found = printable(&found.to_string(), QUOTED_CHARS);
+    MeshError { file: "input".into(), place, kind: MeshErrorKind::Unexpected { expected, found } }
+}
+
+/// Shortened, with control characters escaped.
+fn printable(text: &str, most: usize) -> String {
+    let mut out = String::new();
+    for c in text.chars().take(most) {
+        if c.is_control() {
+            out.extend(c.escape_default());
+        } else {
+            out.push(c);
+        }
     }
-    let kind = MeshErrorKind::Unexpected { expected: expected.into(), found };
-    MeshError { file: "input".into(), place, kind }
+    if text.chars().nth(most).is_some() {
+        out.push_str("...");
+    }
+    out
 }

@@ -196,10 +196,13 @@ fn see(cell: &Moments, [px, py, pz]: [f64; 3]) -> Seen {
 #[inline(always)]
 fn angles(block: &Block, lanes: u8, point: [f64; 3]) -> (f64, f64) {
     let (mut sines, mut cosines) = ([0.0; WIDTH], [0.0; WIDTH]);
-    for lane in 0..WIDTH {
-        let [a, b, c] = [0, 1, 2]
-            .map(|v| [0, 1, 2].map(|axis| f64::from(block.vertex[v][axis][lane]) - point[axis]));
-        (sines[lane], cosines[lane]) = tangent(a, b, c);
+    let [px, py, pz] = point;
+    let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = &block.vertex;
+    for i in 0..WIDTH {
+        let a = [f64::from(ax[i]) - px, f64::from(ay[i]) - py, f64::from(az[i]) - pz];
+        let b = [f64::from(bx[i]) - px, f64::from(by[i]) - py, f64::from(bz[i]) - pz];
+        let c = [f64::from(cx[i]) - px, f64::from(cy[i]) - py, f64::from(cz[i]) - pz];
+        (sines[i], cosines[i]) = tangent(a, b, c);
     }
     let (mut sum, mut size) = (0.0, 0.0);
     let mut rest = lanes;

@@ -25,11 +25,15 @@ fn half_solid_angle(point: [f64; 3], triangle: [[f32; 3]; 3]) -> f64 {
 /// operations in the same order wherever it is inlined, so the same bits.
 #[inline(always)]
 pub(crate) fn tangent(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> (f64, f64) {
-    let dot = |p: [f64; 3], q: [f64; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-    let length = |p: [f64; 3]| dot(p, p).sqrt();
     let normal = [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]];
-    let (la, lb, lc) = (length(a), length(b), length(c));
+    let (la, lb, lc) = (dot(a, a).sqrt(), dot(b, b).sqrt(), dot(c, c).sqrt());
     (dot(a, normal), la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+}
+
+// No closure: those do not get the vector instructions of what they are inlined into.
+#[inline(always)]
+fn dot(p: [f64; 3], q: [f64; 3]) -> f64 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
 /// The angle of such a tangent.
