@@ -4,7 +4,7 @@
 use crate::core::{Watch, blocks, checked, left_for_build, split, total, zeros};
 use crate::error::{self, Failure};
 use crate::figures::Build;
-use crate::rays::{Invalid, one, sides};
+use crate::rays::{Arrays, Invalid, View, one};
 use crate::surface::Surface;
 use crate::work;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -26,18 +26,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// Rays of a task: a megabyte.
 const BLOCK: usize = 16_384;
 
-/// A batch of rays in `f64`: arrays with one entry a ray, or with one for all of them.
+/// A batch of rays in `f64`; see [`Arrays`].
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
-pub struct DoubleRays {
-    count: usize,
-    origins: Py<PyArray1<f64>>,
-    directions: Py<PyArray1<f64>>,
-    t_min: Py<PyArray1<f64>>,
-    t_max: Py<PyArray1<f64>>,
-    masks: Option<Py<PyArray1<u32>>>,
-    skip: Option<Py<PyArray1<i32>>>,
-    sides: Sides,
-}
+pub struct DoubleRays(Arrays<f64>);
 
 #[pymethods]
 impl DoubleRays {
@@ -55,128 +46,42 @@ impl DoubleRays {
         skip: Option<Py<PyArray1<i32>>>,
         faces: &str,
     ) -> PyResult<DoubleRays> {
-        let sides = sides(faces)?;
-        let rays = DoubleRays { count, origins, directions, t_min, t_max, masks, skip, sides };
-        let arrays = rays.borrow(py)?;
-        let view = arrays.view()?;
-        let fits = |len: usize, each: usize| {
-            len == each || each.checked_mul(count).is_some_and(|needed| len == needed)
-        };
-        let fit = fits(view.origins.len(), 3)
-            && fits(view.directions.len(), 3)
-            && fits(view.t_min.len(), 1)
-            && fits(view.t_max.len(), 1)
-            && view.masks.is_none_or(|masks| fits(masks.len(), 1))
-            && view.skip.is_none_or(|skip| fits(skip.len(), 1));
-        if !fit {
-            return Err(error::argument("rays", None, "arrays of rays differ in length".into()));
-        }
-        drop(arrays);
-        Ok(rays)
+        let (lines, ranges) = ([origins, directions], [t_min, t_max]);
+        Ok(DoubleRays(Arrays::new(py, count, lines, ranges, masks, skip, faces)?))
     }
 
     /// Number of rays.
     fn __len__(&self) -> usize {
-        self.count
+        self.0.count()
     }
 
     /// Index of the first ray that can hit nothing; see `DoubleRay::is_valid`.
     fn first_invalid(&self, py: Python<'_>) -> PyResult<Option<usize>> {
-        let arrays = self.borrow(py)?;
+        let arrays = self.0.borrow(py)?;
         let view = arrays.view()?;
-        Ok(py.detach(|| (0..view.count).find(|&i| !view.ray(i).is_valid())))
+        Ok(py.detach(|| (0..view.count).find(|&i| !ray_of(&view, i).is_valid())))
     }
 }
 
-impl DoubleRays {
-    fn borrow<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py>> {
-        fn read<'py, T: numpy::Element>(
-            py: Python<'py>,
-            array: &Py<PyArray1<T>>,
-        ) -> PyResult<PyReadonlyArray1<'py, T>> {
-            Ok(array.bind(py).try_readonly()?)
+/// A ray.
+fn ray_of(view: &View<'_, f64>, i: usize) -> DoubleRay {
+    let ((origin, dir), (t_min, t_max)) = (view.line(i), view.range(i));
+    DoubleRay { origin, dir, t_min, t_max }
+}
+
+/// Some rays, and how many of them hit nothing whatever the scene, their ranges aside.
+fn rays_of(view: &View<'_, f64>, range: Range<usize>) -> (Vec<DoubleRay>, Invalid) {
+    let mut invalid = Invalid::default();
+    let start = range.start;
+    let rays: Vec<DoubleRay> = range.map(|i| ray_of(view, i)).collect();
+    for (i, ray) in rays.iter().enumerate() {
+        let has_range = !ray.t_min.is_nan() && !ray.t_max.is_nan();
+        let whole = DoubleRay::new(ray.origin, ray.dir);
+        if !has_range || !whole.is_valid() {
+            invalid = invalid.and(Invalid { count: 1, first: start + i });
         }
-        Ok(Borrowed {
-            count: self.count,
-            origins: read(py, &self.origins)?,
-            directions: read(py, &self.directions)?,
-            t_min: read(py, &self.t_min)?,
-            t_max: read(py, &self.t_max)?,
-            masks: self.masks.as_ref().map(|masks| read(py, masks)).transpose()?,
-            skip: self.skip.as_ref().map(|skip| read(py, skip)).transpose()?,
-            sides: self.sides,
-        })
     }
-}
-
-/// Borrowed arrays.
-struct Borrowed<'py> {
-    count: usize,
-    origins: PyReadonlyArray1<'py, f64>,
-    directions: PyReadonlyArray1<'py, f64>,
-    t_min: PyReadonlyArray1<'py, f64>,
-    t_max: PyReadonlyArray1<'py, f64>,
-    masks: Option<PyReadonlyArray1<'py, u32>>,
-    skip: Option<PyReadonlyArray1<'py, i32>>,
-    sides: Sides,
-}
-
-impl Borrowed<'_> {
-    fn view(&self) -> PyResult<View<'_>> {
-        let masks = self.masks.as_ref().map(|masks| masks.as_slice()).transpose()?;
-        let skip = self.skip.as_ref().map(|skip| skip.as_slice()).transpose()?;
-        Ok(View {
-            count: self.count,
-            origins: self.origins.as_slice()?,
-            directions: self.directions.as_slice()?,
-            t_min: self.t_min.as_slice()?,
-            t_max: self.t_max.as_slice()?,
-            masks,
-            skip: skip.map(bytemuck::cast_slice),
-            sides: self.sides,
-        })
-    }
-}
-
-/// The numbers of some rays.
-#[derive(Clone, Copy)]
-struct View<'a> {
-    count: usize,
-    origins: &'a [f64],
-    directions: &'a [f64],
-    t_min: &'a [f64],
-    t_max: &'a [f64],
-    masks: Option<&'a [u32]>,
-    /// Primitives to ignore, numbered through all meshes; `u32::MAX` is none.
-    skip: Option<&'a [u32]>,
-    /// The sides of triangles that are hit.
-    sides: Sides,
-}
-
-impl View<'_> {
-    fn ray(&self, i: usize) -> DoubleRay {
-        let three = |values: &[f64]| {
-            let at = if values.len() == 3 { 0 } else { 3 * i };
-            [values[at], values[at + 1], values[at + 2]]
-        };
-        let (origin, dir) = (three(self.origins), three(self.directions));
-        DoubleRay { origin, dir, t_min: one(self.t_min, i), t_max: one(self.t_max, i) }
-    }
-
-    /// Some rays, and how many of them hit nothing whatever the scene, their ranges aside.
-    fn rays(&self, range: Range<usize>) -> (Vec<DoubleRay>, Invalid) {
-        let mut invalid = Invalid::default();
-        let start = range.start;
-        let rays: Vec<DoubleRay> = range.map(|i| self.ray(i)).collect();
-        for (i, ray) in rays.iter().enumerate() {
-            let has_range = !ray.t_min.is_nan() && !ray.t_max.is_nan();
-            let whole = DoubleRay::new(ray.origin, ray.dir);
-            if !has_range || !whole.is_valid() {
-                invalid = invalid.and(Invalid { count: 1, first: start + i });
-            }
-        }
-        (rays, invalid)
-    }
+    (rays, invalid)
 }
 
 /// What rays are cast at.
@@ -402,7 +307,7 @@ impl DoubleCore {
         threads: usize,
         _start: Option<PyReadonlyArray1<'_, i64>>,
     ) -> PyResult<Answer<'py>> {
-        let arrays = rays.borrow(py)?;
+        let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let n = view.count;
         let (mut t, mut prim, mut geom) = (zeros::<f64>(n)?, zeros::<i32>(n)?, zeros::<i32>(n)?);
@@ -411,7 +316,7 @@ impl DoubleCore {
         let tasks = blocks(n, block).zip(chunks).collect();
         let trace = |(range, ((t, prim), geom)): (Range<usize>, (TAndPrim<'_>, _))| {
             let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
-            let (rays, invalid) = view.rays(range.clone());
+            let (rays, invalid) = rays_of(&view, range.clone());
             match (&self.held, self.filter(&view, &range)) {
                 (Held::Meshes(object, _), filter) => {
                     match filter {
@@ -446,13 +351,13 @@ impl DoubleCore {
         threads: usize,
         _start: Option<PyReadonlyArray1<'_, i64>>,
     ) -> PyResult<(Bound<'py, PyArray1<bool>>, usize, usize)> {
-        let arrays = rays.borrow(py)?;
+        let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let mut hit = vec![false; checked::<bool>(view.count)?];
         let block = crate::core::block(view.count, threads, BLOCK);
         let tasks = blocks(view.count, block).zip(hit.chunks_mut(block)).collect();
         let trace = |(range, hit): (Range<usize>, &mut [bool])| {
-            let (rays, invalid) = view.rays(range.clone());
+            let (rays, invalid) = rays_of(&view, range.clone());
             match (&self.held, self.filter(&view, &range)) {
                 (Held::Meshes(object, _), Some(f)) => {
                     cast(object).with_filter(f).occluded_into(&rays, hit);
@@ -476,13 +381,13 @@ impl DoubleCore {
         rays: &DoubleRays,
         threads: usize,
     ) -> PyResult<(Bound<'py, PyArray1<i32>>, usize, usize)> {
-        let arrays = rays.borrow(py)?;
+        let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let mut counts = zeros::<i32>(view.count)?;
         let block = crate::core::block(view.count, threads, BLOCK);
         let tasks = blocks(view.count, block).zip(counts.chunks_mut(block)).collect();
         let trace = |(range, counts): (Range<usize>, &mut [i32])| {
-            let (rays, invalid) = view.rays(range.clone());
+            let (rays, invalid) = rays_of(&view, range.clone());
             let found = match (&self.held, self.filter(&view, &range)) {
                 (Held::Meshes(object, _), Some(f)) => cast(object).with_filter(f).count_hits(&rays),
                 (Held::Meshes(object, _), None) => cast(object).count_hits(&rays),
@@ -505,12 +410,12 @@ impl DoubleCore {
         threads: usize,
         k: Option<usize>,
     ) -> PyResult<Rows<'py>> {
-        let arrays = rays.borrow(py)?;
+        let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let (n, k) = (view.count, k.unwrap_or(usize::MAX));
         let ranges = blocks(n, crate::core::block(n, threads, BLOCK)).collect();
         let trace = |range: Range<usize>| {
-            let (rays, invalid) = view.rays(range.clone());
+            let (rays, invalid) = rays_of(&view, range.clone());
             let all = match (&self.held, self.filter(&view, &range)) {
                 (Held::Meshes(object, _), Some(f)) => {
                     of_meshes(cast(object).with_filter(f).first_hits(&rays, k))
@@ -570,7 +475,7 @@ impl DoubleCore {
         threads: usize,
         ray: Option<PyReadonlyArray1<'py, i64>>,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, usize)> {
-        let arrays = rays.borrow(py)?;
+        let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let (t, prim, geom) = (t.as_slice()?, prim.as_slice()?, geom.as_slice()?);
         let ray = ray.as_ref().map(|ray| ray.as_slice()).transpose()?;
@@ -592,7 +497,7 @@ impl DoubleCore {
                     continue;
                 };
                 let ray = ray.map_or(i, |ray| ray[i] as usize);
-                let ray = (ray < view.count).then(|| view.ray(ray).with_range(t[i], t[i]));
+                let ray = (ray < view.count).then(|| ray_of(&view, ray).with_range(t[i], t[i]));
                 let found = ray.is_some_and(|ray| self.look(surface, prim, geom[i], &ray, value));
                 lost += usize::from(!found);
             }
@@ -641,7 +546,7 @@ impl DoubleCore {
     }
 
     /// A filter, where any ray of the range may have hits that do not count.
-    fn filter<'a>(&'a self, view: &View<'a>, range: &Range<usize>) -> Option<RayFilter<'a>> {
+    fn filter<'a>(&'a self, view: &View<'a, f64>, range: &Range<usize>) -> Option<RayFilter<'a>> {
         let masks = crate::core::masks_that_refuse(&self.masks, view.masks, range);
         let is_plain = masks.is_none() && view.skip.is_none() && view.sides == Sides::Both;
         (!is_plain).then_some(RayFilter { first: range.start, core: self, masks, view: *view })
@@ -653,7 +558,7 @@ struct RayFilter<'a> {
     first: usize,
     core: &'a DoubleCore,
     masks: Option<&'a [u32]>,
-    view: View<'a>,
+    view: View<'a, f64>,
 }
 
 impl RayFilter<'_> {
@@ -676,7 +581,7 @@ impl RayFilter<'_> {
     ) -> bool {
         let sides = self.view.sides;
         sides == Sides::Both || {
-            let ray = place(&self.view.ray(ray)).with_range(t, t);
+            let ray = place(&ray_of(&self.view, ray)).with_range(t, t);
             geometry.intersect_on(prim, &ray, sides).is_some()
         }
     }

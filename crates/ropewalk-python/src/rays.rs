@@ -6,18 +6,21 @@ use pyo3::prelude::*;
 use ropewalk::{Ray, Sides};
 use std::ops::Range;
 
-/// A batch of rays: arrays with one entry a ray, or with one for all of them.
-#[pyclass(frozen, module = "ropewalk._ropewalk")]
-pub struct Rays {
+/// Rays in arrays of floats, with one entry a ray or with one for all of them.
+pub struct Arrays<T> {
     count: usize,
-    origins: Py<PyArray1<f32>>,
-    directions: Py<PyArray1<f32>>,
-    t_min: Py<PyArray1<f32>>,
-    t_max: Py<PyArray1<f32>>,
+    origins: Py<PyArray1<T>>,
+    directions: Py<PyArray1<T>>,
+    t_min: Py<PyArray1<T>>,
+    t_max: Py<PyArray1<T>>,
     masks: Option<Py<PyArray1<u32>>>,
     skip: Option<Py<PyArray1<i32>>>,
     sides: Sides,
 }
+
+/// A batch of rays in `f32`.
+#[pyclass(frozen, module = "ropewalk._ropewalk")]
+pub struct Rays(Arrays<f32>);
 
 #[pymethods]
 impl Rays {
@@ -35,8 +38,43 @@ impl Rays {
         skip: Option<Py<PyArray1<i32>>>,
         faces: &str,
     ) -> PyResult<Rays> {
+        let (lines, ranges) = ([origins, directions], [t_min, t_max]);
+        Ok(Rays(Arrays::new(py, count, lines, ranges, masks, skip, faces)?))
+    }
+
+    /// Number of rays.
+    fn __len__(&self) -> usize {
+        self.0.count()
+    }
+
+    /// Index of the first ray that can hit nothing; see `Ray::is_valid`.
+    fn first_invalid(&self, py: Python<'_>) -> PyResult<Option<usize>> {
+        let arrays = self.0.borrow(py)?;
+        let view = arrays.view()?;
+        Ok(py.detach(|| (0..view.count).find(|&i| !view.ray(i).is_valid())))
+    }
+}
+
+impl Rays {
+    /// The arrays, readable until the borrow is dropped.
+    pub fn borrow<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py, f32>> {
+        self.0.borrow(py)
+    }
+}
+
+impl<T: Element + Copy> Arrays<T> {
+    /// Arrays must be contiguous: three numbers a ray in `origins` and `directions`, one in the others.
+    pub fn new(
+        py: Python<'_>,
+        count: usize,
+        [origins, directions]: [Py<PyArray1<T>>; 2],
+        [t_min, t_max]: [Py<PyArray1<T>>; 2],
+        masks: Option<Py<PyArray1<u32>>>,
+        skip: Option<Py<PyArray1<i32>>>,
+        faces: &str,
+    ) -> PyResult<Self> {
         let sides = sides(faces)?;
-        let rays = Rays { count, origins, directions, t_min, t_max, masks, skip, sides };
+        let rays = Arrays { count, origins, directions, t_min, t_max, masks, skip, sides };
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;
         let fits = |len: usize, each: usize| {
@@ -56,21 +94,12 @@ impl Rays {
     }
 
     /// Number of rays.
-    fn __len__(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Index of the first ray that can hit nothing; see `Ray::is_valid`.
-    fn first_invalid(&self, py: Python<'_>) -> PyResult<Option<usize>> {
-        let arrays = self.borrow(py)?;
-        let view = arrays.view()?;
-        Ok(py.detach(|| (0..view.count).find(|&i| !view.ray(i).is_valid())))
-    }
-}
-
-impl Rays {
     /// The arrays, readable until the borrow is dropped.
-    pub fn borrow<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py>> {
+    pub fn borrow<'py>(&self, py: Python<'py>) -> PyResult<Borrowed<'py, T>> {
         Ok(Borrowed {
             count: self.count,
             sides: self.sides,
@@ -92,20 +121,20 @@ fn borrow<'py, T: Element>(
 }
 
 /// Borrowed arrays.
-pub struct Borrowed<'py> {
+pub struct Borrowed<'py, T: Element> {
     count: usize,
     sides: Sides,
-    origins: PyReadonlyArray1<'py, f32>,
-    directions: PyReadonlyArray1<'py, f32>,
-    t_min: PyReadonlyArray1<'py, f32>,
-    t_max: PyReadonlyArray1<'py, f32>,
+    origins: PyReadonlyArray1<'py, T>,
+    directions: PyReadonlyArray1<'py, T>,
+    t_min: PyReadonlyArray1<'py, T>,
+    t_max: PyReadonlyArray1<'py, T>,
     masks: Option<PyReadonlyArray1<'py, u32>>,
     skip: Option<PyReadonlyArray1<'py, i32>>,
 }
 
-impl Borrowed<'_> {
+impl<T: Element> Borrowed<'_, T> {
     /// Their numbers.
-    pub fn view(&self) -> PyResult<View<'_>> {
+    pub fn view(&self) -> PyResult<View<'_, T>> {
         let masks = self.masks.as_ref().map(|masks| masks.as_slice()).transpose()?;
         let skip = self.skip.as_ref().map(|skip| skip.as_slice()).transpose()?;
         Ok(View {
@@ -123,15 +152,15 @@ impl Borrowed<'_> {
 
 /// The numbers of some rays.
 #[derive(Clone, Copy)]
-pub struct View<'a> {
+pub struct View<'a, T = f32> {
     /// How many rays.
     pub count: usize,
     /// The sides of primitives that are hit.
     pub sides: Sides,
-    origins: &'a [f32],
-    directions: &'a [f32],
-    t_min: &'a [f32],
-    t_max: &'a [f32],
+    origins: &'a [T],
+    directions: &'a [T],
+    t_min: &'a [T],
+    t_max: &'a [T],
     /// Masks of the rays.
     pub masks: Option<&'a [u32]>,
     /// Primitives to ignore, numbered through all meshes; `u32::MAX` is none.
@@ -155,17 +184,25 @@ impl Invalid {
     }
 }
 
-impl View<'_> {
+impl<T: Copy> View<'_, T> {
     /// Origin and direction of a ray.
     #[inline(always)]
-    pub fn line(&self, i: usize) -> ([f32; 3], [f32; 3]) {
+    pub fn line(&self, i: usize) -> ([T; 3], [T; 3]) {
         (three(self.origins, i), three(self.directions, i))
     }
 
+    /// Smallest and largest parameter of a ray.
+    #[inline(always)]
+    pub fn range(&self, i: usize) -> (T, T) {
+        (one(self.t_min, i), one(self.t_max, i))
+    }
+}
+
+impl View<'_, f32> {
     #[inline(always)]
     fn ray(&self, i: usize) -> Ray {
-        let (origin, dir) = self.line(i);
-        Ray { origin, dir, t_min: one(self.t_min, i), t_max: one(self.t_max, i) }
+        let ((origin, dir), (t_min, t_max)) = (self.line(i), self.range(i));
+        Ray { origin, dir, t_min, t_max }
     }
 
     /// Writes some rays to `rays`.
@@ -209,7 +246,7 @@ pub fn one<T: Copy>(values: &[T], i: usize) -> T {
 }
 
 #[inline(always)]
-fn three(values: &[f32], i: usize) -> [f32; 3] {
+fn three<T: Copy>(values: &[T], i: usize) -> [T; 3] {
     let at = if values.len() == 3 { 0 } else { 3 * i };
     [values[at], values[at + 1], values[at + 2]]
 }
