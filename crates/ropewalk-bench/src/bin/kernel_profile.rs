@@ -1,7 +1,7 @@
 //! Nanoseconds and counted events per ray of the batch kernels, without peers.
 //!
 //! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START] [PRESETS]`, names separated by commas;
-//! START is `automatic`, `root` or `entry`, `cells` for rays that start from the cells of their origins,
+//! START is `automatic`, `root` or `entry`, `wave` for the root and no beams, `cells` for rays that start from the cells of their origins,
 //! `single` for one call a ray, or `walker` for walks with only the next segment known. Rounds of the presets are
 //! interleaved.
 //!
@@ -33,12 +33,13 @@ fn main() -> anyhow::Result<()> {
         "automatic" => Start::Automatic,
         "root" => Start::Root,
         "entry" => Start::Entry,
-        "single" | "walker" => Start::Root,
+        "wave" | "single" | "walker" => Start::Root,
         "cells" => Start::Entry,
         name => anyhow::bail!("no start {name}"),
     };
     let asked = |start: &str| arguments.get(4).is_some_and(|name| name == start);
     let (single, walker, from_cells) = (asked("single"), asked("walker"), asked("cells"));
+    let wave = asked("wave");
     let presets = match list(5) {
         names if names.is_empty() => vec![Preset::Balanced],
         names => names.iter().map(|name| preset(name)).collect::<anyhow::Result<_>>()?,
@@ -46,12 +47,13 @@ fn main() -> anyhow::Result<()> {
     let catalog =
         Catalog { data: PathBuf::from("../shared/data"), generated: "target/bench-scenes".into() };
     println!(
-        "{:12} {:9} {:8} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
+        "{:12} {:9} {:8} {:>7} {:>7} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6} {:>6}",
         "scene",
         "workload",
         "preset",
         "Mrays/s",
         "ns/ray",
+        "beam",
         "skip",
         "looks",
         "boxed",
@@ -87,7 +89,7 @@ fn main() -> anyhow::Result<()> {
             }
             let caster = |engine| {
                 let caster = Wave::caster(engine).with_level(level).context("level not available");
-                let caster = caster.map(|c| c.with_start(start));
+                let caster = caster.map(|c| c.with_start(start).with_beams(!wave));
                 if from_cells { caster.map(|c| c.with_cells(&cells)) } else { caster }
             };
             let casters: Vec<_> = engines.iter().map(caster).collect::<anyhow::Result<_>>()?;
@@ -104,10 +106,11 @@ fn main() -> anyhow::Result<()> {
                 let n = rays.len() as f64;
                 let per = |count: u64| count as f64 / n;
                 println!(
-                    "{:12} {name:9} {:8} {:7.2} {ns:7.1} {:6.3} {:6.2} {:6.2} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
+                    "{:12} {name:9} {:8} {:7.2} {ns:7.1} {:6.3} {:6.3} {:6.2} {:6.2} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
                     entry.name,
                     preset.name(),
                     1e3 / ns,
+                    per(in_beams(caster, kind.question(), &rays)),
                     per(events.skipped),
                     per(events.looked),
                     per(events.boxed),
@@ -121,6 +124,17 @@ fn main() -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Rays answered in beams.
+fn in_beams(caster: &BatchCaster<'_>, question: Question, rays: &[ropewalk::Ray]) -> u64 {
+    let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
+    let report = match question {
+        Question::Occluded => caster.occluded_into(rays, &mut vec![false; rays.len()]),
+        Question::AllHits | Question::FirstHits(_) => return 0,
+        _ => caster.closest_hit_into(rays, &mut t, &mut prim),
+    };
+    report.beam_rays
 }
 
 fn preset(name: &str) -> anyhow::Result<Preset> {

@@ -3,8 +3,9 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::beam::FourDoubles;
+use super::beam::{Eight, FourDoubles};
 use super::level::{Found, Nearest, Range, Root, Simd};
+use super::look::look;
 use super::slot::{Loaded, Slot};
 use super::x86::{self, Children, Lanes};
 use crate::ray::Ray;
@@ -72,13 +73,9 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
-    unsafe fn meets<const ROUNDED: bool>(slot: &Slot, block: &Block) -> u32 {
-        // SAFETY: the caller vouches for the features.
-        unsafe {
-            let lanes = x86::lanes::<ROUNDED>(slot, block);
-            let (limit, t_min) = (_mm256_set1_ps(slot.limit), _mm256_set1_ps(slot.t_min));
-            _mm256_movemask_ps(meets(&lanes, limit, t_min)) as u32
-        }
+    unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe { look::<Eight, ROUNDED, WHOLE>(slot, block) }
     }
 
     #[inline(always)]

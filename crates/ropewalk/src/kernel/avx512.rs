@@ -3,9 +3,10 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::beam::EightDoubles;
+use super::beam::{Eight, EightDoubles};
 use super::level::{Found, Nearest, Range, Root, Simd};
 use super::list::{List, Lists};
+use super::look::look;
 use super::order::{order, room};
 use super::slot::{Loaded, Slot};
 use super::x86::{self, Children, Lanes};
@@ -68,13 +69,9 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn meets<const ROUNDED: bool>(slot: &Slot, block: &Block) -> u32 {
-        // SAFETY: the caller vouches for the features.
-        unsafe {
-            let lanes = x86::lanes::<ROUNDED>(slot, block);
-            let (limit, t_min) = (_mm256_set1_ps(slot.limit), _mm256_set1_ps(slot.t_min));
-            u32::from(meets(&lanes, limit, t_min))
-        }
+    unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe { look::<Eight, ROUNDED, WHOLE>(slot, block) }
     }
 
     #[inline(always)]

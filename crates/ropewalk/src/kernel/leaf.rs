@@ -44,10 +44,11 @@ impl Leaves<'_> {
         // SAFETY: passed on to the caller.
         unsafe {
             let block = self.block(line);
-            let lanes = if Q::ROUNDED {
-                L::meets::<true>(slot, block)
-            } else {
-                L::meets::<false>(slot, block)
+            let lanes = match (Q::ROUNDED, Q::MANY) {
+                (false, false) => L::meets::<false, true>(slot, block),
+                (false, true) => L::meets::<false, false>(slot, block),
+                (true, false) => L::meets::<true, true>(slot, block),
+                (true, true) => L::meets::<true, false>(slot, block),
             };
             if SHAPES { lanes | block.shape_lanes() << WIDTH } else { lanes }
         }

@@ -188,11 +188,12 @@ pub trait Simd: Locate {
         lists.add(moved, n);
     }
 
-    /// The lanes that [`Simd::test`] may find clear or open, and perhaps a few more.
+    /// The lanes that [`Simd::test`] may find clear or open, and perhaps a few more; see
+    /// [`look`](super::look::look).
     ///
     /// # Safety
     /// See the trait.
-    unsafe fn meets<const ROUNDED: bool>(slot: &Slot, block: &Block) -> u32;
+    unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32;
 
     /// Tests the triangles of a block against the slot's ray, `t_min` and `limit`.
     ///

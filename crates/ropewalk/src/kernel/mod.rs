@@ -25,6 +25,7 @@ mod lanes;
 mod leaf;
 mod level;
 mod list;
+mod look;
 mod memory;
 mod order;
 mod particles;

@@ -56,7 +56,7 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    unsafe fn meets<const ROUNDED: bool>(slot: &Slot, block: &Block) -> u32 {
+    unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32 {
         // SAFETY: portable code.
         let found = unsafe { Self::test::<ROUNDED>(slot, block, &mut Range::default()) };
         found.clear | found.open

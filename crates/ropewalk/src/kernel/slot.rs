@@ -206,13 +206,22 @@ impl Slot {
     pub fn pop(&mut self, any: bool) -> bool {
         let mut below = (self.sp as usize).saturating_sub(1).min(STACK - 1);
         if self.may_lie_in_plane {
-            while below > 0 && earlier(self.enter[below]) - self.near_zero > self.limit {
-                below -= 1;
-            }
+            below = self.skip_behind(below);
         }
         self.sp = below as u32;
         let behind = earlier(self.enter[below]) - self.near_zero > self.limit;
         (below == 0) | behind | (any & (self.best_id != u32::MAX))
+    }
+
+    /// The first cell from `below` down that does not start behind the limit. A call, since the compiler
+    /// would ask first whether the stack is empty, which cannot be predicted.
+    #[cold]
+    #[inline(never)]
+    fn skip_behind(&self, mut below: usize) -> usize {
+        while below > 0 && earlier(self.enter[below]) - self.near_zero > self.limit {
+            below -= 1;
+        }
+        below
     }
 
     /// Empties the stack but for the root.

@@ -27,9 +27,11 @@ mod vector;
 mod x86;
 
 pub use shaft::BeamSimd;
+#[cfg(test)]
+pub use vector::Lanes as PortableLanes;
 pub use vector::{Doubles, Vector};
 #[cfg(target_arch = "x86_64")]
-pub use x86::{EightDoubles, FourDoubles};
+pub use x86::{Eight, EightDoubles, FourDoubles};
 
 use super::exact::{At, Exact, place};
 use super::query::{Any, BatchQuery, Closest};
