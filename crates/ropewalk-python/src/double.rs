@@ -509,6 +509,19 @@ impl DoubleCore {
 }
 
 impl DoubleCore {
+    /// The meshes and the tree over them; `None` of instances.
+    pub fn object(&self) -> Option<&Arc<Object>> {
+        match &self.held {
+            Held::Meshes(object, _) => Some(object),
+            Held::Instances(_) => None,
+        }
+    }
+
+    /// The first primitive of each mesh, and the number of primitives.
+    pub fn first_primitives(&self) -> &[u32] {
+        &self.starts
+    }
+
     /// Writes what is asked about the hit of a ray whose range holds its parameter alone; false if the ray does
     /// not hit the primitive there.
     fn look(

@@ -222,12 +222,25 @@ impl DoubleGeometry {
         &self.faces
     }
 
+    /// The vertices of a triangle, if it is there.
+    #[inline(always)]
+    pub(super) fn vertices_of(&self, prim_id: u32) -> Option<[[f64; 3]; 3]> {
+        let &[a, b, c] = self.faces.get(prim_id as usize)?;
+        let vertex = |i: u32| self.vertices.get(i as usize).copied();
+        Some([vertex(a)?, vertex(b)?, vertex(c)?])
+    }
+
+    #[inline(always)]
+    pub(super) fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
     /// A ray for the search.
     pub(crate) fn narrow(&self, ray: &DoubleRay) -> Narrowed {
         self.frame.ray(ray)
     }
 
-    fn is_degenerate(&self, prim_id: u32) -> bool {
+    pub(super) fn is_degenerate(&self, prim_id: u32) -> bool {
         !self.degenerate.is_empty() && self.degenerate.binary_search(&prim_id).is_ok()
     }
 

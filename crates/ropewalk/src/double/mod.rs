@@ -10,6 +10,7 @@
 mod brute_force;
 mod geometry;
 mod narrow;
+mod point;
 mod ray;
 
 pub use crate::kernel::{DoubleAllHits, DoubleBatchHit, DoubleCaster, DoubleFilter};
