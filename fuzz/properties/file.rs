@@ -1,6 +1,9 @@
 //! What must hold of saved scenes for any bytes. Shared by the fuzz target and by ordinary tests.
 
-use ropewalk::file::{Check, HEADER_BYTES, MAX_SECTIONS, Opened, open};
+use ropewalk::double::{DoubleCaster, DoubleRay};
+use ropewalk::file::{
+    AnyOpened, Check, HEADER_BYTES, MAX_SECTIONS, Opened, OpenedDouble, open_any,
+};
 use ropewalk::kernel::{BatchCaster, Level, Masks, SharedBytes, Sorting, Start};
 use ropewalk::point::{Cell, PointBruteForce, PointQueries};
 use ropewalk::wide::Treelet;
@@ -26,6 +29,9 @@ pub fn shared(bytes: &[u8]) -> SharedBytes {
     Arc::new(Aligned { lines, len: bytes.len() })
 }
 
+/// The sections whose checksums make the geometry's hash.
+const GEOMETRY: [&[u8; 4]; 7] = [b"TRIS", b"SIDE", b"KIND", b"ENDS", b"NUMS", b"VERT", b"FACE"];
+
 /// Makes length, geometry hash and checksum of the header what they would be if somebody had saved these
 /// bytes, so that an altered byte meets the checks behind them.
 pub fn repair(bytes: &mut [u8]) {
@@ -40,7 +46,7 @@ pub fn repair(bytes: &mut [u8]) {
     let mut hasher = blake3::Hasher::new();
     hasher.update(b"ropewalk geometry 1");
     for entry in prefix[HEADER_BYTES..].chunks_exact(64) {
-        if [b"TRIS", b"SIDE", b"KIND", b"ENDS", b"NUMS"].iter().any(|tag| entry.starts_with(*tag)) {
+        if GEOMETRY.iter().any(|tag| entry.starts_with(*tag)) {
             hasher.update(&entry[..4]).update(&entry[16..24]).update(&entry[32..]);
         }
     }
@@ -56,10 +62,14 @@ pub fn repair(bytes: &mut [u8]) {
 /// If the property does not hold.
 pub fn opens_or_refuses(bytes: &[u8]) -> bool {
     let bytes = shared(bytes);
-    let whole = open(&bytes, Check::Everything);
-    match open(&bytes, Check::Structure) {
-        Ok(scene) => {
+    let whole = open_any(&bytes, Check::Everything);
+    match open_any(&bytes, Check::Structure) {
+        Ok(AnyOpened::Single(scene)) => {
             ask(&scene);
+            true
+        }
+        Ok(AnyOpened::Double(scene)) => {
+            ask_double(&scene);
             true
         }
         Err(error) => {
@@ -133,6 +143,67 @@ pub fn points(geometry: &Geometry) -> Vec<[f64; 3]> {
         }));
     }
     points
+}
+
+/// Rays of `f64` and points in and around the box of a scene in `f64`, and such as none should be.
+pub fn double_rays_and_points(scene: &OpenedDouble) -> (Vec<DoubleRay>, Vec<[f64; 3]>) {
+    let mut unit = Geometry::new();
+    let triangle = ropewalk::primitive::Triangle { vertices: [[0.0; 3], [1.0; 3], [1.0; 3]] };
+    // It is finite.
+    let _ = unit.push(triangle, ropewalk::Sides::Both);
+    let (low, high) = scene.geometry.bounds().unwrap_or(([0.0; 3], [1.0; 3]));
+    let place = |p: [f64; 3]| std::array::from_fn(|a| low[a] + (high[a] - low[a]) * p[a]);
+    let along = |d: [f64; 3]| std::array::from_fn(|a| (high[a] - low[a]) * d[a]);
+    let moved = |ray: &Ray| DoubleRay {
+        origin: place(ray.origin.map(f64::from)),
+        dir: along(ray.dir.map(f64::from)),
+        t_min: f64::from(ray.t_min),
+        t_max: f64::from(ray.t_max),
+    };
+    let rays = rays(&unit).iter().map(moved).collect();
+    (rays, points(&unit).into_iter().map(place).collect())
+}
+
+/// The same as [`ask`] in `f64`.
+pub fn ask_double(scene: &OpenedDouble) {
+    let Opened { tree, geometry, .. } = scene;
+    let (rays, points) = double_rays_and_points(scene);
+    for level in Level::ALL {
+        let Some(caster) = DoubleCaster::new(tree, geometry).with_level(level) else { continue };
+        let caster = caster.with_threads(1);
+        for id in caster.closest_hit(&rays).prim_id {
+            if (id as usize) < geometry.len() {
+                geometry.normal(id);
+            }
+        }
+        caster.occluded(&rays);
+        caster.all_hits(&rays);
+        caster.first_hits(&rays, 2);
+        caster.count_hits(&rays);
+        let odd = |_: usize, hit: &ropewalk::double::DoubleHit| hit.prim_id % 2 == 1;
+        caster.with_filter(odd).closest_hit(&rays);
+        if let Ok(queries) = PointQueries::new(tree, geometry)
+            && let Some(queries) = queries.with_level(level)
+        {
+            let queries = queries.with_threads(1);
+            queries.closest_point(&points);
+            queries.signed_distance(&points);
+            if level == Level::Scalar {
+                queries.winding_number(&points);
+                let moments = queries.winding_moments();
+                let _ = queries.contains_by_winding(&moments, &points);
+                for cell in queries.locate(&points).into_iter().flatten() {
+                    queries.cell_corners(cell);
+                    queries.cell_primitives(cell);
+                }
+            }
+        }
+    }
+    let oracle = PointBruteForce { geometry };
+    for point in points {
+        oracle.closest_point(point);
+        oracle.side(point);
+    }
 }
 
 /// Puts every query to a scene, at every level, and looks only whether it comes back.

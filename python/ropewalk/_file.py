@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _ropewalk
-from ._arrays import ArrayLike, as_faces, as_float32, as_rows
-from ._errors import ArgumentError, ArgumentTypeError, SceneWriteError
+from ._arrays import ArrayLike, as_faces, as_float32, as_float64, as_rows
+from ._errors import ArgumentError, ArgumentTypeError
 
 if TYPE_CHECKING:
     from ._ropewalk import Core, DoubleCore
@@ -33,22 +33,15 @@ class Saved:
             path: the file; one that is there is replaced, and whoever has it open keeps it.
 
         Raises:
-            SceneWriteError: it cannot be written, and nothing is left behind; or the scene is of double
-                precision.
+            SceneWriteError: it cannot be written, and nothing is left behind; or the scene is one of
+                instances.
 
         >>> import os, tempfile, ropewalk
         >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     scene.save(os.path.join(folder, "triangle.rope"))
         """
-        name = _path(path)
-        if not isinstance(self._core, _ropewalk.Core):
-            raise SceneWriteError(
-                f"cannot save {name}: scenes of double precision cannot be saved; make the scene with "
-                "precision='single'",
-                "path",
-            )
-        _ropewalk.save(self._core, name)
+        _ropewalk.save(self._core, _path(path))
 
     @classmethod
     def open(
@@ -72,7 +65,7 @@ class Saved:
                 while the scene is in use: answers may be anything then, and the process may end.
                 Saving over it is safe.
             vertices: with ``faces``, open the file only if the scene was made of these arrays, rounded to
-                float32.
+                float32 unless it is of double precision.
             faces: see ``vertices``.
 
         Raises:
@@ -92,14 +85,16 @@ class Saved:
         >>> float(scene.closest_hit([0.2, 0.2, 1.0], [0, 0, -1]).t)
         1.0
         """
+        rounded: np.ndarray | None = None
         v: np.ndarray | None = None
         f: np.ndarray | None = None
         if (vertices is None) != (faces is None):
             raise ArgumentError("vertices, faces: expected both or none", "vertices")
         if vertices is not None and faces is not None:
-            v = as_float32(as_rows(vertices, "vertices"))
+            rows = as_rows(vertices, "vertices")
+            rounded, v = as_float32(rows), as_float64(rows)
             f = as_faces(faces, "faces", len(v))
-        core = _ropewalk.open(_path(path), bool(verify), bool(copy), v, f)
+        core = _ropewalk.open(_path(path), bool(verify), bool(copy), rounded, v, f)
         scene: Any = cls.__new__(cls)
         scene._adopt(core)
         return scene  # type: ignore[no-any-return]

@@ -10,7 +10,7 @@ import numpy as np
 from ._arrays import ArrayLike, as_array, as_points, as_threads
 from ._errors import ArgumentError, ArgumentTypeError, InvalidPointError, InvalidPointWarning
 from ._report import plural
-from ._ropewalk import Points
+from ._ropewalk import DoubleCore, Points
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -54,12 +54,13 @@ class Cells(NamedTuple):
 
     Attributes:
         cell: int64, their numbers, which mean nothing to other scenes.
-        bounds: float32, shape (..., 2, 3), lower and upper corners; NaN for what is no leaf.
+        bounds: float32, shape (..., 2, 3), lower and upper corners; NaN for what is no leaf. Of a scene of
+            double precision float64, rounded: the tree has numbers of its own.
         primitives: int32, how many each leaf refers to; -1 for what is no leaf.
     """
 
     cell: NDArray[np.int64]
-    bounds: NDArray[np.float32]
+    bounds: NDArray[np.float32] | NDArray[np.float64]
     primitives: NDArray[np.int32]
 
     def __repr__(self) -> str:
@@ -72,7 +73,7 @@ class PointMethods:
 
     __slots__ = ()
 
-    _core: Core
+    _core: Core | DoubleCore
     _points: Points | None
 
     def closest_point(
@@ -83,13 +84,14 @@ class PointMethods:
         Args:
             points: shape (..., 3), any numeric dtype, used in float64.
             threads: threads of this call; 0 is one a processor that this process may use.
-            strict: refuse points that are NaN, infinite or beyond 1e100, instead of counting them in a
-                warning.
+            strict: refuse points that are NaN, infinite or beyond 1e100 (in a scene of double precision also
+                beyond 1e100 times its size), instead of counting them in a warning.
 
         Distances are in units of the vertices. Faces without area are never the nearest.
 
         Raises:
-            ArgumentError: points of another shape; a scene that holds other primitives than triangles.
+            ArgumentError: points of another shape; a scene that holds other primitives than triangles, or
+                instances.
             ArgumentTypeError: points that are no real numbers.
             InvalidPointError: with ``strict``, the first such point.
             KeyboardInterrupt: Ctrl-C stops a query within a fraction of a second.
@@ -101,7 +103,7 @@ class PointMethods:
         >>> scene.closest_point([0.25, 0.25, -2]).position
         array([0.25, 0.25, 0.  ])
         """
-        values, shape, threads = _given(points, threads, strict)
+        values, shape, threads = self._given(points, threads, strict)
         distance, prim, geom, position, uv = self._ask().closest_point(values, threads)
         return ClosestPoints(
             distance.reshape(shape),
@@ -123,7 +125,7 @@ class PointMethods:
         >>> scene.distance([[0.25, 0.25, -2], [0, 0, 0]])
         array([2., 0.])
         """
-        values, shape, threads = _given(points, threads, strict)
+        values, shape, threads = self._given(points, threads, strict)
         return self._ask().distance(values, False, threads).reshape(shape)
 
     def signed_distance(
@@ -141,7 +143,7 @@ class PointMethods:
         >>> scene.signed_distance([[0.25, 0.25, 0.125], [0.25, 0.25, -2.0]])
         array([-0.125,  2.   ])
         """
-        values, shape, threads = _given(points, threads, strict)
+        values, shape, threads = self._given(points, threads, strict)
         return self._ask().distance(values, True, threads).reshape(shape)
 
     def contains(
@@ -178,7 +180,7 @@ class PointMethods:
             raise ArgumentError(
                 f"method: expected 'parity' or 'winding', found {method!r}", "method"
             )
-        values, shape, threads = _given(points, threads, strict)
+        values, shape, threads = self._given(points, threads, strict)
         return self._ask().contains(values, method == "winding", threads).reshape(shape)
 
     def winding_number(
@@ -217,7 +219,7 @@ class PointMethods:
             raise ArgumentError(
                 f"accuracy: expected a number, 0 or more, found {accuracy!r}", "accuracy"
             )
-        values, shape, threads = _given(points, threads, strict)
+        values, shape, threads = self._given(points, threads, strict)
         return self._ask().winding_number(values, float(off.item()), threads).reshape(shape)
 
     def locate(
@@ -234,7 +236,7 @@ class PointMethods:
         >>> scene.locate([[0.2, 0.2, 0], [5, 5, 5]])
         array([ 0, -1])
         """
-        values, shape, threads = _given(points, threads, strict)
+        values, shape, threads = self._given(points, threads, strict)
         return self._ask().locate(values, threads).reshape(shape)
 
     def cells(self, cell: ArrayLike | None = None) -> Cells:
@@ -255,7 +257,8 @@ class PointMethods:
                [1., 1., 0.]], dtype=float32)
         """
         if cell is None:
-            return Cells(*self._ask().cells())
+            found, bounds, count = self._ask().cells()
+            return Cells(found, self._as_bounds(bounds), count)
         given = as_array(cell, "cell")
         if given.dtype.kind == "f" and given.size:
             raise ArgumentTypeError(f"cell: expected integers, found dtype {given.dtype}", "cell")
@@ -264,37 +267,42 @@ class PointMethods:
         numbers = np.ascontiguousarray(given, np.int64).reshape(-1)
         found, bounds, count = self._ask().cells(numbers)
         shape = given.shape
-        return Cells(found.reshape(shape), bounds.reshape(*shape, 2, 3), count.reshape(shape))
+        bounds = self._as_bounds(bounds).reshape(*shape, 2, 3)
+        return Cells(found.reshape(shape), bounds, count.reshape(shape))
+
+    def _as_bounds(
+        self, bounds: NDArray[np.float64]
+    ) -> NDArray[np.float32] | NDArray[np.float64]:
+        return bounds if isinstance(self._core, DoubleCore) else bounds.astype(np.float32)
 
     def _ask(self) -> Points:
         if self._points is None:
-            self._points = Points(self._single("points"))  # type: ignore[misc]  # a slot of Scene
+            self._points = Points(self._core)  # type: ignore[misc]  # a slot of Scene
         return self._points
 
-
-def _given(
-    points: ArrayLike, threads: int, strict: bool
-) -> tuple[NDArray[np.float64], tuple[int, ...], int]:
-    """Points as contiguous float64, their shape, and threads."""
-    given = as_points(points, "points")
-    # Numbers beyond float64 (of long double) become infinite, which is refused or counted.
-    with np.errstate(over="ignore", under="ignore"):
-        values = np.require(given, np.float64, ("C", "A")).reshape(-1)
-    threads = as_threads(threads)
-    invalid, first = Points.invalid(values)
-    if invalid and strict:
-        raise InvalidPointError(
-            f"points[{first}] is {tuple(map(float, values[3 * first : 3 * first + 3]))}; expected "
-            "finite numbers up to 1e100",
-            "points",
-            first,
-        )
-    if invalid:
-        warnings.warn(
-            f"{invalid} points are NaN, infinite or beyond 1e100 and have no answer; the first is "
-            f"point {first}",
-            InvalidPointWarning,
-            stacklevel=3,
-        )
-    count = len(values) // 3
-    return values, given.shape[:-1], 1 if count <= _FEW_POINTS else threads
+    def _given(
+        self, points: ArrayLike, threads: int, strict: bool
+    ) -> tuple[NDArray[np.float64], tuple[int, ...], int]:
+        """Points as contiguous float64, their shape, and threads."""
+        given = as_points(points, "points")
+        # Numbers beyond float64 (of long double) become infinite, which is refused or counted.
+        with np.errstate(over="ignore", under="ignore"):
+            values = np.require(given, np.float64, ("C", "A")).reshape(-1)
+        threads = as_threads(threads)
+        invalid, first = self._ask().invalid(values)
+        if invalid and strict:
+            raise InvalidPointError(
+                f"points[{first}] is {tuple(map(float, values[3 * first : 3 * first + 3]))}; expected "
+                "finite numbers up to 1e100",
+                "points",
+                first,
+            )
+        if invalid:
+            warnings.warn(
+                f"{invalid} points are NaN, infinite or beyond 1e100 and have no answer; the first is "
+                f"point {first}",
+                InvalidPointWarning,
+                stacklevel=3,
+            )
+        count = len(values) // 3
+        return values, given.shape[:-1], 1 if count <= _FEW_POINTS else threads

@@ -213,12 +213,80 @@ def test_saving_fails_and_leaves_nothing(scene, tmp_path):
         scene.save(None)
 
 
-def test_scenes_of_double_precision_are_refused(tmp_path):
-    v, f = random_mesh(10, 1)
-    scene = ropewalk.Scene(v.astype(np.float64) + 0.1, f, precision="double")
-    with pytest.raises(ropewalk.SceneWriteError, match="precision='single'"):
-        scene.save(tmp_path / "a")
-    assert not os.listdir(tmp_path)
+def double_scene(n, seed):
+    v, f = random_mesh(n, seed)
+    v = v.astype(np.float64) / 3 + 1e7
+    flat = np.concatenate([f, [[0, 0, 1]]])
+    scene = ropewalk.Scene.from_meshes([(v, flat), (v + 1, f)], masks=[1, 6])
+    assert scene.precision == "double"
+    return scene, v, f
+
+
+@pytest.mark.parametrize("how", [{}, {"verify": True}, {"copy": True}])
+def test_scenes_of_double_precision(tmp_path, how):
+    scene, v, f = double_scene(300, 1)
+    path = tmp_path / "double.rope"
+    scene.save(path)
+    opened = ropewalk.Scene.open(path, **how)
+    assert opened.precision == "double" and opened.report.degenerate == 1
+    np.testing.assert_array_equal(opened.bounds, scene.bounds)
+    np.testing.assert_array_equal(opened.masks, scene.masks)
+    np.testing.assert_array_equal(opened.mesh_sizes, scene.mesh_sizes)
+    rng = np.random.default_rng(2)
+    o, d = rng.normal(size=(500, 3)) * 3 + 1e7, rng.normal(size=(500, 3))
+    for other in (opened, pickle.loads(pickle.dumps(opened))):
+        one, two = scene.all_hits(o, d), other.all_hits(o, d)
+        for name in ("offsets", "t", "prim_id", "geom_id"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
+        np.testing.assert_array_equal(scene.closest_hit(o, d).normal, other.closest_hit(o, d).normal)
+        for one, two in zip(scene.closest_point(o), other.closest_point(o)):
+            np.testing.assert_array_equal(one, two)
+        np.testing.assert_array_equal(scene.contains(o), other.contains(o))
+    again = tmp_path / "again.rope"
+    opened.save(again)
+    assert again.read_bytes() == path.read_bytes()
+    placed = ropewalk.Scene.from_instances([(opened, np.eye(4))])
+    np.testing.assert_array_equal(placed.closest_hit(o, d).t, scene.closest_hit(o, d).t)
+    with pytest.raises(ropewalk.SceneWriteError, match="instances cannot be saved"):
+        placed.save(tmp_path / "placed")
+    with pytest.raises(ropewalk.OtherGeometryError, match="2 meshes"):
+        ropewalk.Scene.open(path, vertices=v, faces=f)
+
+
+def test_double_precision_only_for_its_own_geometry(tmp_path):
+    v, f = random_mesh(50, 3)
+    v, path = v.astype(np.float64) / 3 + 1e7, tmp_path / "double.rope"
+    ropewalk.Scene(v, f).save(path)
+    assert ropewalk.Scene.open(path, vertices=v, faces=f).precision == "double"
+    for other in (v + 1e-8, v.astype(np.float32)):
+        with pytest.raises(ropewalk.OtherGeometryError, match="other geometry"):
+            ropewalk.Scene.open(path, vertices=other, faces=f)
+    with pytest.raises(ropewalk.OtherGeometryError, match="built for"):
+        ropewalk.Scene.open(path, vertices=v, faces=f[1:])
+
+
+def test_altered_double_precision_harms_nobody(tmp_path):
+    scene, _, _ = double_scene(200, 4)
+    path = tmp_path / "double.rope"
+    scene.save(path)
+    whole, rng = path.read_bytes(), np.random.default_rng(5)
+    for cut in (0, 100, 1000, len(whole) - 64):
+        path.write_bytes(whole[:cut])
+        with pytest.raises(ropewalk.SceneFileError):
+            ropewalk.Scene.open(path)
+    o, d = rng.normal(size=(300, 3)) * 3 + 1e7, rng.normal(size=(300, 3))
+    for at in rng.integers(1000, len(whole), 60):
+        altered = bytearray(whole)
+        altered[at] ^= 0xFF
+        path.write_bytes(altered)
+        with pytest.raises(ropewalk.SceneFileError):
+            ropewalk.Scene.open(path, verify=True)
+        try:
+            opened = ropewalk.Scene.open(path, copy=True)
+        except ropewalk.SceneFileError:
+            continue
+        opened.all_hits(o, d)
+        opened.signed_distance(o)
 
 
 def test_whoever_has_a_file_open_keeps_it(scene, saved):

@@ -52,10 +52,10 @@ def ball(levels, scale=1.0, offset=0.0):
     return corners.astype(float) * scale + offset, faces.reshape(-1, 3)
 
 
-def brute_distance(triangles, p):
+def brute_distance(triangles, p, dtype=np.float32):
     """Least distances from triangles, in float64, from edges and planes."""
     best = np.full(len(p), np.inf)
-    for a, b, c in triangles.astype(np.float32).astype(float):
+    for a, b, c in triangles.astype(dtype).astype(float):
         normal = np.cross(b - a, c - a)
         if not normal.any():
             continue

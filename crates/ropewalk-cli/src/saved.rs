@@ -3,7 +3,7 @@
 use crate::engine::Loaded;
 use anyhow::Context;
 use ropewalk::Aabb;
-use ropewalk::file::{Check, Extra, Opened, Tag};
+use ropewalk::file::{AnyOpened, Check, Extra, Opened, Tag};
 use ropewalk_render::default_camera;
 use ropewalk_workload::View;
 
@@ -67,7 +67,13 @@ pub fn is_saved(spec: &str) -> bool {
     ropewalk_file::is_saved_scene(spec).unwrap_or(false)
 }
 
-/// Opens a saved scene.
+/// Opens a saved scene of either precision.
+pub fn open_any(spec: &str, verify: bool) -> anyhow::Result<AnyOpened> {
+    let check = if verify { Check::Everything } else { Check::Structure };
+    ropewalk_file::open_any(spec, check).context("no saved scene was opened")
+}
+
+/// Opens a saved scene of single precision.
 pub fn open(spec: &str, verify: bool) -> anyhow::Result<Opened> {
     let check = if verify { Check::Everything } else { Check::Structure };
     ropewalk_file::open(spec, check).context("no saved scene was opened")

@@ -328,6 +328,23 @@ fn a_file_that_is_no_saved_scene_is_refused_in_a_sentence() {
     assert_eq!(files(folder.path()), ["a.nff", "a.rope"]);
 }
 
+#[test]
+fn scenes_of_double_precision_are_shown() {
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus-seed/file");
+    let output = ropewalk(&seeds, &["info", "double.rope", "--verify", "--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let info: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&info["precision"], &info["degenerate"]), (&"double".into(), &1.into()));
+    assert!(info["bounds"][0][0].as_f64().unwrap() >= 1e7);
+    let names: Vec<_> = info["sections"].as_array().unwrap().iter().map(|s| &s["name"]).collect();
+    assert_eq!(names, ["TREE", "VERT", "FACE", "DBOX", "FLAT", "stat"]);
+    let text = String::from_utf8(ropewalk(&seeds, &["info", "double.rope"]).stdout).unwrap();
+    assert!(text.contains("double precision") && text.contains("vertices in f64"), "{text}");
+    let output = ropewalk(&seeds, &["bench", "double.rope"]);
+    assert!(!output.status.success());
+    assert!(stderr(&output).contains("one of single precision is needed here"));
+}
+
 /// Mesh files are read wherever scenes are, and hit from both sides.
 #[test]
 fn mesh_files_are_rendered_and_timed() {

@@ -24,7 +24,7 @@ mod map;
 
 pub use map::is_saved_scene;
 
-use ropewalk::file::{Check, Contents, FileError, Opened, WriteError, Written};
+use ropewalk::file::{AnyOpened, Check, Contents, FileError, Opened, WriteError, Written};
 use ropewalk_scene::write_atomically;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -97,6 +97,24 @@ pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Opened, OpenError> {
     map::map(path).and_then(|bytes| opened(path, &bytes, check))
 }
 
+/// [`open`] for a scene of either precision.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn open_any(path: impl AsRef<Path>, check: Check) -> Result<AnyOpened, OpenError> {
+    let path = path.as_ref();
+    map::map(path).and_then(|bytes| any_opened(path, &bytes, check))
+}
+
+/// [`read`] for a scene of either precision.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn read_any(path: impl AsRef<Path>, check: Check) -> Result<AnyOpened, OpenError> {
+    let path = path.as_ref();
+    map::read(path).and_then(|bytes| any_opened(path, &bytes, check))
+}
+
 /// Opens a saved scene by reading it into memory of its own, on huge pages where the system has them: what
 /// becomes of the file does not matter afterwards.
 ///
@@ -105,6 +123,15 @@ pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Opened, OpenError> {
 pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Opened, OpenError> {
     let path = path.as_ref();
     map::read(path).and_then(|bytes| opened(path, &bytes, check))
+}
+
+fn any_opened(
+    path: &Path,
+    bytes: &ropewalk::kernel::SharedBytes,
+    check: Check,
+) -> Result<AnyOpened, OpenError> {
+    let opened = ropewalk::file::open_any(bytes, check);
+    opened.map_err(|source| OpenError::Content { path: path.to_owned(), source })
 }
 
 fn opened(

@@ -509,6 +509,47 @@ impl DoubleCore {
 }
 
 impl DoubleCore {
+    /// The meshes and the tree over them; `None` of instances.
+    pub fn object(&self) -> Option<&Arc<Object>> {
+        match &self.held {
+            Held::Meshes(object, _) => Some(object),
+            Held::Instances(_) => None,
+        }
+    }
+
+    /// The same, with figures of the build.
+    pub fn built(&self) -> Option<(&Object, &Build)> {
+        match &self.held {
+            Held::Meshes(object, report) => Some((object, report)),
+            Held::Instances(_) => None,
+        }
+    }
+
+    /// Meshes that have been built, their first primitives and masks.
+    pub fn of(
+        object: Object,
+        report: Build,
+        (starts, masks): (Vec<u32>, Vec<u32>),
+        preset: Preset,
+    ) -> Self {
+        DoubleCore { held: Held::Meshes(Arc::new(object), report), starts, masks, preset }
+    }
+
+    /// The first primitive of each mesh, and the number of primitives.
+    pub fn first_primitives(&self) -> &[u32] {
+        &self.starts
+    }
+
+    /// Masks of the meshes.
+    pub fn mesh_masks(&self) -> &[u32] {
+        &self.masks
+    }
+
+    /// The preset.
+    pub fn built_with(&self) -> Preset {
+        self.preset
+    }
+
     /// Writes what is asked about the hit of a ray whose range holds its parameter alone; false if the ray does
     /// not hit the primitive there.
     fn look(

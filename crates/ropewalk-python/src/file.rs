@@ -1,65 +1,92 @@
 //! Scenes in files: saved, opened by a map or a copy, and compared with arrays.
 
 use crate::core::Core;
+use crate::double::DoubleCore;
 use crate::error::{self, Failure};
 use crate::figures::Build;
 use crate::work;
-use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use ropewalk::GeometryError;
 use ropewalk::build::Preset;
-use ropewalk::file::{Check, Contents, Extra, Figures, Hash, Opened, Tag, short, triangles_hash};
+use ropewalk::file::{
+    AnyOpened, Check, Contents, Extra, Figures, Hash, Opened, Tag, short, triangles_hash,
+};
+use ropewalk::instance::Object;
 use ropewalk_file::{OpenError, SaveError};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The section that holds meshes: their number, the first primitive of each and the number of primitives, the
 /// mask of each; all `u32`.
 const MESHES: Tag = Tag(*b"mesh");
 
+/// A scene of either precision.
+#[derive(FromPyObject)]
+pub enum AnyCore<'py> {
+    Single(PyRef<'py, Core>),
+    Double(PyRef<'py, DoubleCore>),
+}
+
 /// Saves a scene; the bytes of the file.
 #[pyfunction]
-pub fn save(py: Python<'_>, core: &Core, path: PathBuf) -> PyResult<u64> {
+pub fn save(py: Python<'_>, core: AnyCore<'_>, path: PathBuf) -> PyResult<u64> {
+    match &core {
+        AnyCore::Single(core) => {
+            let contents = Contents::new(&core.tree, &core.geometry);
+            write(py, path, contents, &core.report, core.preset, (&core.starts, &core.masks))
+        }
+        AnyCore::Double(core) => {
+            let (object, report) = core.built().ok_or_else(|| {
+                let message =
+                    "scenes of instances cannot be saved; save the scenes that they place";
+                error::not_saved(format!("cannot save {}: {message}", path.display()))
+            })?;
+            let contents = Contents::of_double(&object.tree, &object.geometry);
+            let meshes = (core.first_primitives(), core.mesh_masks());
+            write(py, path, contents, report, core.built_with(), meshes)
+        }
+    }
+}
+
+/// Writes a scene with its meshes, their first primitives and masks.
+fn write(
+    py: Python<'_>,
+    path: PathBuf,
+    contents: Contents<'_>,
+    report: &Build,
+    preset: Preset,
+    (starts, masks): (&[u32], &[u32]),
+) -> PyResult<u64> {
     let figures = Figures {
-        preset: Some(core.preset),
-        duplication: core.report.duplication,
-        tree: core.report.tree.clone(),
+        preset: Some(preset),
+        duplication: report.duplication,
+        tree: report.tree.clone(),
     };
-    let numbers = [core.masks.len() as u32].into_iter().chain(core.starts.iter().copied());
-    let numbers = numbers.chain(core.masks.iter().copied());
+    let numbers = [masks.len() as u32].into_iter().chain(starts.iter().copied());
+    let numbers = numbers.chain(masks.iter().copied());
     let extra = [Extra { tag: MESHES, bytes: numbers.flat_map(u32::to_le_bytes).collect() }];
-    let contents = Contents {
-        figures: Some(&figures),
-        extra: &extra,
-        ..Contents::new(&core.tree, &core.geometry)
-    };
+    let contents = Contents { figures: Some(&figures), extra: &extra, ..contents };
     let saved = alone(py, || ropewalk_file::save(&path, &contents))?;
     Ok(saved.map_err(|error: SaveError| error::not_saved(error.to_string()))?.bytes)
 }
 
-/// Opens a saved scene: maps it, or copies it. With a mesh, only a scene that was built over it alone.
+/// Opens a saved scene, a [`Core`] or a [`DoubleCore`]: maps it, or copies it. With a mesh, only a scene that was
+/// built over it alone.
 #[pyfunction]
-#[pyo3(signature = (path, verify, copy, vertices=None, faces=None))]
+#[pyo3(signature = (path, verify, copy, rounded=None, vertices=None, faces=None))]
 pub fn open(
     py: Python<'_>,
     path: PathBuf,
     verify: bool,
     copy: bool,
-    vertices: Option<PyReadonlyArray2<'_, f32>>,
+    rounded: Option<PyReadonlyArray2<'_, f32>>,
+    vertices: Option<PyReadonlyArray2<'_, f64>>,
     faces: Option<PyReadonlyArray2<'_, u32>>,
-) -> PyResult<Core> {
+) -> PyResult<Py<PyAny>> {
     let check = if verify { Check::Everything } else { Check::Structure };
     let open = || match copy {
-        true => ropewalk_file::read(&path, check),
-        false => ropewalk_file::open(&path, check),
-    };
-    let expected = match (&vertices, &faces) {
-        (Some(vertices), Some(faces)) => {
-            let (count, (vertices, _)) = (faces.shape()[0], vertices.as_slice()?.as_chunks::<3>());
-            let (faces, _) = faces.as_slice()?.as_chunks::<3>();
-            let hash = alone(py, || mesh_hash(vertices, faces))?;
-            Some((count, hash.map_err(|failure| failure.into_exception(true))?))
-        }
-        _ => None,
+        true => ropewalk_file::read_any(&path, check),
+        false => ropewalk_file::open_any(&path, check),
     };
     let scene = alone(py, open)?.map_err(|error: OpenError| {
         let message = error.to_string();
@@ -69,38 +96,84 @@ pub fn open(
             _ => error::file("SceneFileError", message),
         }
     })?;
+    let faces = match &faces {
+        Some(faces) => Some(faces.as_slice()?.as_chunks::<3>().0),
+        None => None,
+    };
+    match scene {
+        AnyOpened::Single(scene) => {
+            let expected = match (&rounded, faces) {
+                (Some(vertices), Some(faces)) => {
+                    let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
+                    let hash = alone(py, || triangles(vertices, faces))?;
+                    Some((faces.len(), hash.map_err(|failure| failure.into_exception(true))?))
+                }
+                _ => None,
+            };
+            let geometry = &scene.geometry;
+            let (count, degenerate) = (geometry.len(), geometry.degenerate_count());
+            let (starts, masks) =
+                checked(&path, (count, &scene.geometry_hash, &scene.extra), expected)?;
+            let Opened { tree, geometry, figures, .. } = *scene;
+            let (preset, report) = built(figures, count, degenerate);
+            Ok(Py::new(py, Core { geometry, tree, report, starts, masks, preset })?.into_any())
+        }
+        AnyOpened::Double(scene) => {
+            let expected = match (&vertices, faces) {
+                (Some(vertices), Some(faces)) => {
+                    let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
+                    let hash = alone(py, || ropewalk::file::mesh_hash(vertices, faces))?;
+                    Some((faces.len(), hash))
+                }
+                _ => None,
+            };
+            let geometry = &scene.geometry;
+            let (count, degenerate) = (geometry.len(), geometry.degenerate_count());
+            let (starts, masks) =
+                checked(&path, (count, &scene.geometry_hash, &scene.extra), expected)?;
+            let Opened { tree, geometry, figures, .. } = *scene;
+            let (preset, report) = built(figures, count, degenerate);
+            let object = Object { geometry, tree };
+            Ok(Py::new(py, DoubleCore::of(object, report, (starts, masks), preset))?.into_any())
+        }
+    }
+}
+
+/// Preset and figures of a saved scene.
+fn built(figures: Option<Figures>, primitives: usize, degenerate: usize) -> (Preset, Build) {
+    let Figures { preset, duplication, tree } = figures.unwrap_or_default();
+    let report = Build { primitives, degenerate, duplication, tree, seconds: 0.0 };
+    (preset.unwrap_or(Preset::Balanced), report)
+}
+
+/// First primitives and masks of the meshes of a file of so many primitives and that hash, if they are what is
+/// expected.
+fn checked(
+    path: &Path,
+    (found, found_hash, extra): (usize, &Hash, &[Extra]),
+    expected: Option<(usize, Hash)>,
+) -> PyResult<(Vec<u32>, Vec<u32>)> {
     let refuse =
         |reason: String| error::file("OtherGeometryError", format!("{}: {reason}", path.display()));
-    let (starts, masks) = meshes(&scene).ok_or_else(|| {
+    let (starts, masks) = meshes(found, extra).ok_or_else(|| {
         let message = "section mesh does not fit the number of primitives";
         error::file("SceneFileError", format!("{}: {message}", path.display()))
     })?;
     if let Some((faces, hash)) = expected {
-        let found = scene.geometry.len();
         if masks.len() != 1 {
             return Err(refuse(format!("it holds {} meshes; expected one", masks.len())));
         }
         if found != faces {
             return Err(refuse(format!("it was built for {found} primitives; expected {faces}")));
         }
-        if hash != scene.geometry_hash {
-            let (expected, found) = (short(&hash), short(&scene.geometry_hash));
+        if hash != *found_hash {
+            let (expected, found) = (short(&hash), short(found_hash));
             return Err(refuse(format!(
                 "it was built for other geometry; expected hash {expected}, found {found}"
             )));
         }
     }
-    let Opened { tree, geometry, figures, .. } = scene;
-    let figures = figures.unwrap_or_default();
-    let report = Build {
-        primitives: geometry.len(),
-        degenerate: geometry.degenerate_count(),
-        duplication: figures.duplication,
-        tree: figures.tree,
-        seconds: 0.0,
-    };
-    let preset = figures.preset.unwrap_or(Preset::Balanced);
-    Ok(Core { geometry, tree, report, starts, masks, preset })
+    Ok((starts, masks))
 }
 
 /// Work on this thread without the GIL; a panic becomes an exception.
@@ -111,9 +184,8 @@ fn alone<T: Send>(py: Python<'_>, work: impl Fn() -> T + Sync) -> PyResult<T> {
 
 /// First primitives and masks of the meshes of a file: one mesh if it does not say. `None` if what it says
 /// cannot be.
-fn meshes(scene: &Opened) -> Option<(Vec<u32>, Vec<u32>)> {
-    let primitives = scene.geometry.len();
-    let Some(extra) = scene.extra.iter().find(|extra| extra.tag == MESHES) else {
+fn meshes(primitives: usize, extra: &[Extra]) -> Option<(Vec<u32>, Vec<u32>)> {
+    let Some(extra) = extra.iter().find(|extra| extra.tag == MESHES) else {
         return Some((vec![0, primitives as u32], vec![!0]));
     };
     let (words, []) = extra.bytes.as_chunks::<4>() else { return None };
@@ -128,7 +200,7 @@ fn meshes(scene: &Opened) -> Option<(Vec<u32>, Vec<u32>)> {
 }
 
 /// The hash of the geometry that a scene of one mesh has.
-fn mesh_hash(vertices: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<Hash, Failure> {
+fn triangles(vertices: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<Hash, Failure> {
     let wrong = |i: &u32| *i as usize >= vertices.len();
     if let Some(face) = faces.iter().position(|corners| corners.iter().any(wrong)) {
         let found = faces[face].into_iter().find(wrong).unwrap_or_default();

@@ -1,10 +1,13 @@
 //! Batches of points: the queries of `ropewalk::point` over a scene of triangles.
 
 use crate::core::{Core, zeros};
+use crate::double::DoubleCore;
 use crate::{error, work};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
-use ropewalk::point::{Cell, PointError, PointQueries, WindingMoments, is_near};
+use ropewalk::Geometry;
+use ropewalk::double::DoubleGeometry;
+use ropewalk::point::{Cell, PointError, PointQueries, Triangles, WindingMoments};
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
@@ -23,10 +26,67 @@ const TASKS_PER_THREAD: usize = 4;
 /// Triangles that a task goes through where each point needs all of them.
 const FULL_TASK: usize = 1 << 22;
 
-/// Answers points over the scene of a [`Core`].
+/// What points are asked about.
+#[derive(FromPyObject)]
+enum Asked {
+    Single(Py<Core>),
+    Double(Py<DoubleCore>),
+}
+
+impl Asked {
+    /// The first primitive of each mesh, and the number of primitives.
+    fn first_primitives(&self) -> &[u32] {
+        match self {
+            Asked::Single(core) => core.get().first_primitives(),
+            Asked::Double(core) => core.get().first_primitives(),
+        }
+    }
+
+    fn queries(&self) -> PyResult<Queries<'_>> {
+        match self {
+            Asked::Single(core) => {
+                let core = core.get();
+                Ok(Queries::Single(queries(&core.tree, &core.geometry)?))
+            }
+            Asked::Double(core) => {
+                let object = core.get().object().ok_or_else(|| {
+                    let message =
+                        "scene: points are answered over meshes; this one is of instances";
+                    error::argument("scene", None, message.into())
+                })?;
+                Ok(Queries::Double(queries(&object.tree, &object.geometry)?))
+            }
+        }
+    }
+}
+
+fn queries<'a, G: Triangles>(tree: &'a G::Tree, geometry: &'a G) -> PyResult<PointQueries<'a, G>> {
+    PointQueries::new(tree, geometry)
+        .map(|queries| queries.with_threads(1))
+        .map_err(|e: PointError| error::argument("scene", None, format!("scene: {e}")))
+}
+
+/// Queries in either precision.
+#[derive(Clone, Copy)]
+enum Queries<'a> {
+    Single(PointQueries<'a, Geometry>),
+    Double(PointQueries<'a, DoubleGeometry>),
+}
+
+/// The same of either.
+macro_rules! ask {
+    ($queries:expr, $name:ident => $answer:expr) => {
+        match $queries {
+            Queries::Single($name) => $answer,
+            Queries::Double($name) => $answer,
+        }
+    };
+}
+
+/// Answers points over the scene of a [`Core`] or the meshes of a [`DoubleCore`].
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
 pub struct Points {
-    core: Py<Core>,
+    core: Asked,
     /// Made when first needed.
     moments: OnceLock<WindingMoments>,
 }
@@ -42,21 +102,21 @@ type Nearest<'py> = (
 
 /// Numbers, boxes, and how many primitives each refers to; of leaves.
 type Leaves<'py> =
-    (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray3<f32>>, Bound<'py, PyArray1<i32>>);
+    (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray3<f64>>, Bound<'py, PyArray1<i32>>);
 
 #[pymethods]
 impl Points {
-    /// Refuses scenes that hold other primitives than triangles.
+    /// Refuses scenes that hold other primitives than triangles, and instances.
     #[new]
-    fn new(core: Py<Core>) -> PyResult<Points> {
-        queries(core.get())?;
+    fn new(core: Asked) -> PyResult<Points> {
+        core.queries()?;
         Ok(Points { core, moments: OnceLock::new() })
     }
 
     /// How many points have no answer, and the first of them.
-    #[staticmethod]
-    fn invalid(points: PyReadonlyArray1<'_, f64>) -> PyResult<(usize, usize)> {
-        let (points, _) = points.as_slice()?.as_chunks::<3>();
+    fn invalid(&self, points: PyReadonlyArray1<'_, f64>) -> PyResult<(usize, usize)> {
+        let (points, queries) = (chunked(&points)?, self.core.queries()?);
+        let is_near = |p: &[f64; 3]| ask!(queries, queries => queries.is_near(p));
         let mut wrong = points.iter().enumerate().filter(|(_, p)| !is_near(p)).map(|(i, _)| i);
         let first = wrong.next();
         Ok((first.map_or(0, |_| 1 + wrong.count()), first.unwrap_or(0)))
@@ -69,8 +129,8 @@ impl Points {
         points: PyReadonlyArray1<'py, f64>,
         threads: usize,
     ) -> PyResult<Nearest<'py>> {
-        let (points, core) = (chunked(&points)?, self.core.get());
-        let (n, queries) = (points.len(), queries(core)?);
+        let (points, queries) = (chunked(&points)?, self.core.queries()?);
+        let (n, starts) = (points.len(), self.core.first_primitives());
         let (mut distance, mut prim, mut geom) =
             (zeros::<f64>(n)?, zeros::<i32>(n)?, zeros::<i32>(n)?);
         let (mut position, mut uv) = (zeros::<[f64; 3]>(n)?, zeros::<[f64; 2]>(n)?);
@@ -85,13 +145,13 @@ impl Points {
             threads,
             tasks,
             |(((points, distance), (prim, geom)), (position, uv))| {
-                let found = queries.closest_point(points);
+                let found = ask!(queries, queries => queries.closest_point(points));
                 distance.copy_from_slice(&found.distance);
                 let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
                 prim.copy_from_slice(&found.prim_id);
                 position.copy_from_slice(&found.point);
                 uv.copy_from_slice(&found.uv);
-                crate::core::number(core.first_primitives(), prim, geom);
+                crate::core::number(starts, prim, geom);
             },
         )?;
         Ok((
@@ -112,8 +172,10 @@ impl Points {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         self.each(py, &points, threads, BLOCK, |queries, points, out| {
-            let found =
-                if signed { queries.signed_distance(points) } else { queries.distance(points) };
+            let found = ask!(queries, queries => match signed {
+                true => queries.signed_distance(points),
+                false => queries.distance(points),
+            });
             out.copy_from_slice(&found);
         })
     }
@@ -129,13 +191,14 @@ impl Points {
         if winding {
             let moments = self.moments(py, threads)?;
             return self.each(py, &points, threads, SLOW_BLOCK, |queries, points, out| {
-                if let Ok(found) = queries.contains_by_winding(moments, points) {
+                let found = ask!(queries, queries => queries.contains_by_winding(moments, points));
+                if let Ok(found) = found {
                     out.copy_from_slice(&found);
                 }
             });
         }
         self.each(py, &points, threads, BLOCK, |queries, points, out| {
-            out.copy_from_slice(&queries.contains(points));
+            out.copy_from_slice(&ask!(queries, queries => queries.contains(points)));
         })
     }
 
@@ -150,15 +213,18 @@ impl Points {
         if accuracy > 0.0 {
             let moments = self.moments(py, threads)?;
             return self.each(py, &points, threads, SLOW_BLOCK, |queries, points, out| {
-                if let Ok(found) = queries.winding_number_within(moments, points, accuracy) {
+                let found = ask!(queries, queries => {
+                    queries.winding_number_within(moments, points, accuracy)
+                });
+                if let Ok(found) = found {
                     out.copy_from_slice(&found);
                 }
             });
         }
-        let triangles = self.core.get().geometry.len().max(1);
+        let triangles = self.core.first_primitives().last().map_or(1, |&n| n.max(1) as usize);
         let most = (FULL_TASK / triangles).clamp(1, BLOCK);
         self.each(py, &points, threads, most, |queries, points, out| {
-            out.copy_from_slice(&queries.winding_number(points));
+            out.copy_from_slice(&ask!(queries, queries => queries.winding_number(points)));
         })
     }
 
@@ -170,7 +236,8 @@ impl Points {
         threads: usize,
     ) -> PyResult<Bound<'py, PyArray1<i64>>> {
         self.each(py, &points, threads, BLOCK, |queries, points, out| {
-            for (out, cell) in out.iter_mut().zip(queries.locate(points)) {
+            let cells = ask!(queries, queries => queries.locate(points));
+            for (out, cell) in out.iter_mut().zip(cells) {
                 *out = cell.map_or(-1, |cell| i64::from(cell.to_bits()));
             }
         })
@@ -184,29 +251,30 @@ impl Points {
         py: Python<'py>,
         cells: Option<PyReadonlyArray1<'py, i64>>,
     ) -> PyResult<Leaves<'py>> {
-        let core = self.core.get();
-        let queries = queries(core)?;
+        let queries = self.core.queries()?;
         let cells = match &cells {
             Some(cells) => cells.as_slice()?.to_vec(),
             None => {
-                let all = py.detach(|| queries.cells());
+                let all = py.detach(|| ask!(queries, queries => queries.cells()));
                 all.into_iter().map(|cell| i64::from(cell.to_bits())).collect()
             }
         };
         let (mut bounds, mut counts) =
-            (zeros::<[[f32; 3]; 2]>(cells.len())?, zeros::<i32>(cells.len())?);
+            (zeros::<[[f64; 3]; 2]>(cells.len())?, zeros::<i32>(cells.len())?);
         let tasks =
             (cells.chunks(BLOCK)).zip(bounds.chunks_mut(BLOCK).zip(counts.chunks_mut(BLOCK)));
         work::for_each(py, 1, tasks.collect(), |(cells, (bounds, counts))| {
             for ((&cell, bounds), count) in cells.iter().zip(bounds).zip(counts) {
                 let cell = u32::try_from(cell).ok().map(Cell::from_bits);
-                let leaf = cell.and_then(|cell| Some((queries.cell_box(cell)?, cell)));
-                *bounds = leaf.map_or([[f32::NAN; 3]; 2], |(bounds, _)| [bounds.min, bounds.max]);
-                *count = leaf.map_or(-1, |(_, cell)| queries.cell_primitives(cell).len() as i32);
+                (*bounds, *count) = ([[f64::NAN; 3]; 2], -1);
+                let Some(cell) = cell else { continue };
+                ask!(queries, queries => if let Some(corners) = queries.cell_corners(cell) {
+                    (*bounds, *count) = (corners, queries.cell_primitives(cell).len() as i32);
+                });
             }
         })?;
         let n = cells.len();
-        let bounds: Vec<f32> = bytemuck::cast_vec(bounds);
+        let bounds: Vec<f64> = bytemuck::cast_vec(bounds);
         let bounds = bounds.into_pyarray(py).reshape([n, 2, 3])?;
         Ok((cells.into_pyarray(py), bounds, counts.into_pyarray(py)))
     }
@@ -216,12 +284,13 @@ impl Points {
     /// The moments of the scene's triangles.
     fn moments(&self, py: Python<'_>, threads: usize) -> PyResult<&WindingMoments> {
         if self.moments.get().is_none() {
-            let queries = queries(self.core.get())?;
+            let queries = self.core.queries()?;
+            let moments = |n| ask!(queries, queries => queries.with_threads(n).winding_moments());
             let made = if threads == 1 {
-                py.detach(|| queries.winding_moments())
+                py.detach(|| moments(1))
             } else {
-                let (stop, queries) = (AtomicBool::new(false), queries.with_threads(0));
-                work::watch(py, threads, &stop, |_| Ok(()), || queries.winding_moments())?
+                let stop = AtomicBool::new(false);
+                work::watch(py, threads, &stop, |_| Ok(()), || moments(0))?
             };
             // Two threads may make them at once; they are the same.
             let _ = self.moments.set(made);
@@ -236,22 +305,16 @@ impl Points {
         points: &PyReadonlyArray1<'py, f64>,
         threads: usize,
         most: usize,
-        answer: impl Fn(PointQueries<'_>, &[[f64; 3]], &mut [T]) + Sync,
+        answer: impl Fn(Queries<'_>, &[[f64; 3]], &mut [T]) + Sync,
     ) -> PyResult<Bound<'py, PyArray1<T>>> {
         let points = chunked(points)?;
-        let queries = queries(self.core.get())?;
+        let queries = self.core.queries()?;
         let mut out = zeros::<T>(points.len())?;
         let block = block(points.len(), threads, most);
         let tasks = points.chunks(block).zip(out.chunks_mut(block)).collect();
         work::for_each(py, threads, tasks, |(points, out)| answer(queries, points, out))?;
         Ok(out.into_pyarray(py))
     }
-}
-
-fn queries(core: &Core) -> PyResult<PointQueries<'_>> {
-    PointQueries::new(&core.tree, &core.geometry)
-        .map(|queries| queries.with_threads(1))
-        .map_err(|e: PointError| error::argument("scene", None, format!("scene: {e}")))
 }
 
 fn chunked<'a>(points: &'a PyReadonlyArray1<'_, f64>) -> PyResult<&'a [[f64; 3]]> {

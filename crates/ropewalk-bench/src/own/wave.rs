@@ -71,7 +71,7 @@ impl Wave {
     /// # Errors
     /// If the tree holds anything but triangles.
     pub fn points(&self) -> anyhow::Result<PointQueries<'_>> {
-        Ok(PointQueries::new(&self.tree, &self.geometry)?.with_threads(1))
+        Ok(PointQueries::new(&*self.tree, &*self.geometry)?.with_threads(1))
     }
 }
 

@@ -2,7 +2,8 @@
 
 use crate::output::{print_json, thousands};
 use crate::saved;
-use ropewalk::file::{FORMAT_VERSION, LAYOUT_VERSION, Opened, Tag, short};
+use ropewalk::file::{AnyOpened, FORMAT_VERSION, LAYOUT_VERSION, Opened, Tag, short};
+use ropewalk::wide::WideTree;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -27,9 +28,10 @@ struct Output {
     layout_version: u32,
     verified: bool,
     geometry_hash: String,
+    precision: &'static str,
     primitives: usize,
     degenerate: usize,
-    bounds: Option<[[f32; 3]; 2]>,
+    bounds: Option<Corners>,
     treelets: usize,
     blocks: usize,
     bytes_per_primitive: f64,
@@ -37,6 +39,14 @@ struct Output {
     build: Option<Build>,
     sections: Vec<Section>,
     seconds: f64,
+}
+
+/// Lower and upper corner.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Corners {
+    Single([[f32; 3]; 2]),
+    Double([[f64; 3]; 2]),
 }
 
 /// Figures of the build.
@@ -71,6 +81,10 @@ fn meaning(tag: Tag) -> &'static str {
         Tag::KINDS => "kinds of primitives",
         Tag::ENDS => "where the numbers of primitives end",
         Tag::NUMBERS => "numbers of primitives",
+        Tag::VERTICES => "vertices in f64",
+        Tag::FACES => "triangles by their vertices",
+        Tag::BOX => "box of the vertices",
+        Tag::FLAT => "triangles without area",
         Tag::FIGURES => "figures of the build",
         Tag(name) if name == *b"view" => "the scene's view",
         Tag(name) if name == *b"mesh" => "meshes of the Python package",
@@ -81,15 +95,51 @@ fn meaning(tag: Tag) -> &'static str {
 /// Opens, checks and prints.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     let start = Instant::now();
-    let scene = saved::open(&args.file, args.verify)?;
-    let output = Output::new(args, &scene, start.elapsed().as_secs_f64());
+    let scene = saved::open_any(&args.file, args.verify)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let output = match &scene {
+        AnyOpened::Single(scene) => {
+            let (geometry, bounds) = (&scene.geometry, scene.geometry.bounds());
+            let corners = Corners::Single([bounds.min, bounds.max]);
+            let what = What {
+                precision: "single",
+                primitives: geometry.len(),
+                degenerate: geometry.degenerate_count(),
+                bounds: (!geometry.is_empty()).then_some(corners),
+            };
+            Output::new(args, scene, &scene.tree, what, seconds)
+        }
+        AnyOpened::Double(scene) => {
+            let geometry = &scene.geometry;
+            let what = What {
+                precision: "double",
+                primitives: geometry.len(),
+                degenerate: geometry.degenerate_count(),
+                bounds: geometry.bounds().map(|(min, max)| Corners::Double([min, max])),
+            };
+            Output::new(args, scene, scene.tree.wide(), what, seconds)
+        }
+    };
     if args.json { print_json(&output) } else { output.print() }
 }
 
+/// What the geometry of a scene is, in either precision.
+struct What {
+    precision: &'static str,
+    primitives: usize,
+    degenerate: usize,
+    bounds: Option<Corners>,
+}
+
 impl Output {
-    fn new(args: &Args, scene: &Opened, seconds: f64) -> Self {
-        let Opened { tree, geometry, figures, .. } = scene;
-        let bounds = geometry.bounds();
+    fn new<T, G>(
+        args: &Args,
+        scene: &Opened<T, G>,
+        tree: &WideTree,
+        what: What,
+        seconds: f64,
+    ) -> Self {
+        let (figures, What { precision, primitives, degenerate, bounds }) = (&scene.figures, what);
         let build = figures.as_ref().map(|figures| Build {
             inner_nodes: figures.tree.inner_nodes,
             leaves: figures.tree.leaves,
@@ -115,12 +165,13 @@ impl Output {
             layout_version: LAYOUT_VERSION,
             verified: args.verify,
             geometry_hash: short(&scene.geometry_hash),
-            primitives: geometry.len(),
-            degenerate: geometry.degenerate_count(),
-            bounds: (!geometry.is_empty()).then_some([bounds.min, bounds.max]),
+            precision,
+            primitives,
+            degenerate,
+            bounds,
             treelets: tree.treelets(),
             blocks: tree.blocks(),
-            bytes_per_primitive: tree.bytes() as f64 / geometry.len().max(1) as f64,
+            bytes_per_primitive: tree.bytes() as f64 / primitives.max(1) as f64,
             preset: figures.as_ref().and_then(|figures| Some(figures.preset?.name())),
             build,
             sections: sections.collect(),
@@ -141,14 +192,23 @@ impl Output {
             "  checked         header, sizes and links{checked} ({:.1} ms)",
             1e3 * self.seconds
         );
-        println!("  geometry        {}..., by its bits", self.geometry_hash);
+        println!(
+            "  geometry        {}..., by its bits, {} precision",
+            self.geometry_hash, self.precision
+        );
         println!(
             "  primitives      {:>12}   of them without area {}",
             thousands(self.primitives as u64),
             thousands(self.degenerate as u64)
         );
-        if let Some([low, high]) = self.bounds {
-            println!("  box             {low:?} to {high:?}");
+        match &self.bounds {
+            Some(Corners::Single([low, high])) => {
+                println!("  box             {low:?} to {high:?}");
+            }
+            Some(Corners::Double([low, high])) => {
+                println!("  box             {low:?} to {high:?}");
+            }
+            None => {}
         }
         println!("  treelets        {:>12}", thousands(self.treelets as u64));
         println!("  blocks          {:>12}", thousands(self.blocks as u64));

@@ -1,7 +1,7 @@
 //! Triangles in `f64`.
 
 use super::narrow::{Frame, MARGIN, Narrowed};
-use super::{DoubleHit, DoubleRay};
+use super::{DoubleHit, DoubleRay, Rows};
 use crate::build::{BuildError, BuildReport, BuildSettings, Monitor};
 use crate::geometry::{Geometry, GeometryError};
 use crate::point::expansion::Expansion;
@@ -29,10 +29,10 @@ pub enum DoubleGeometryError {
 /// An indexed mesh in `f64`, face `i` as primitive `i`, hit on both sides.
 #[derive(Clone)]
 pub struct DoubleGeometry {
-    vertices: Vec<[f64; 3]>,
-    faces: Vec<[u32; 3]>,
+    vertices: Rows<[f64; 3]>,
+    faces: Rows<[u32; 3]>,
     /// Faces without area, ascending.
-    degenerate: Vec<u32>,
+    degenerate: Rows<u32>,
     frame: Frame,
     bounds: Option<([f64; 3], [f64; 3])>,
     /// What the kernels take for a geometry: they read triangles from the tree alone.
@@ -46,6 +46,10 @@ pub struct DoubleTree {
 }
 
 impl DoubleTree {
+    pub(crate) fn of_file(wide: WideTree) -> Self {
+        DoubleTree { wide }
+    }
+
     /// The tree over the rounded triangles, in the numbers of the search.
     pub fn wide(&self) -> &WideTree {
         &self.wide
@@ -93,11 +97,33 @@ impl DoubleGeometry {
             return Err(GeometryError::TooMany { max: Geometry::MAX_PRIMITIVES }.into());
         }
         let (frame, bounds) = (Frame::new(min, max), Some((min, max)));
-        let (degenerate, none) = (Vec::new(), Geometry::new());
+        let (vertices, faces) = (Rows::Own(vertices), Rows::Own(faces));
+        let (degenerate, none) = (Rows::Own(Vec::new()), Geometry::new());
         let mut geometry = DoubleGeometry { vertices, faces, degenerate, frame, bounds, none };
         let flat = |&face: &u32| geometry.has_no_area(face);
-        geometry.degenerate = (0..geometry.len() as u32).filter(flat).collect();
+        geometry.degenerate = Rows::Own((0..geometry.len() as u32).filter(flat).collect());
         Ok(geometry)
+    }
+
+    /// The geometry of a file, of finite bounds in order. Vertices, faces and degenerate faces may be any numbers:
+    /// what names nothing is never hit.
+    pub(crate) fn of_file(
+        (vertices, faces): (Rows<[f64; 3]>, Rows<[u32; 3]>),
+        degenerate: Rows<u32>,
+        (min, max): ([f64; 3], [f64; 3]),
+    ) -> Self {
+        let (frame, bounds) = (Frame::new(min, max), Some((min, max)));
+        DoubleGeometry { vertices, faces, degenerate, frame, bounds, none: Geometry::new() }
+    }
+
+    /// True if vertices and faces lie in a file.
+    pub fn is_shared(&self) -> bool {
+        matches!(self.faces, Rows::Stored(_))
+    }
+
+    /// Faces without area, ascending.
+    pub fn degenerate(&self) -> &[u32] {
+        &self.degenerate
     }
 
     /// Builds a tree; see [`WideTree::build`]. The report counts the triangles that are degenerate in
@@ -166,24 +192,19 @@ impl DoubleGeometry {
     }
 
     /// Tests one triangle: [`Triangle::meet`] on the coordinates as they were given. The hit, if its
-    /// parameter is finite and in the ray's range.
-    ///
-    /// # Panics
-    /// If `prim_id` is out of range.
+    /// parameter is finite and in the ray's range; what is no triangle is not hit.
     pub fn intersect(&self, prim_id: u32, ray: &DoubleRay) -> Option<DoubleHit> {
         self.intersect_on(prim_id, ray, Sides::Both)
     }
 
     /// The same on some sides alone.
-    ///
-    /// # Panics
-    /// If `prim_id` is out of range.
     pub fn intersect_on(&self, prim_id: u32, ray: &DoubleRay, sides: Sides) -> Option<DoubleHit> {
         if !ray.is_valid() {
             return None;
         }
-        let [a, b, c] = self.faces[prim_id as usize];
-        let corner = |i: usize, axis: usize| self.vertices[[a, b, c][i] as usize][axis];
+        // An altered file may name what is not there.
+        let corners = self.vertices_of(prim_id)?;
+        let corner = |i: usize, axis: usize| corners[i][axis];
         let frame = Shear::along(&ray.origin, &ray.dir);
         let met = Triangle::meet(corner, &frame, sides)?;
         let accepted = met.t.is_finite() && ray.t_min <= met.t && met.t <= ray.t_max;
@@ -199,7 +220,7 @@ impl DoubleGeometry {
     /// The triangles of the search.
     fn rounded(&self) -> Geometry {
         let mut rounded = Geometry::new();
-        for corners in &self.faces {
+        for corners in self.faces.iter() {
             let vertices = corners.map(|i| self.frame.point(self.vertices[i as usize]));
             let id = rounded.push(Triangle { vertices }, Sides::Both);
             debug_assert!(id.is_ok(), "coordinates are finite, and their number has been checked");
@@ -222,12 +243,25 @@ impl DoubleGeometry {
         &self.faces
     }
 
+    /// The vertices of a triangle, if it is there.
+    #[inline(always)]
+    pub(super) fn vertices_of(&self, prim_id: u32) -> Option<[[f64; 3]; 3]> {
+        let &[a, b, c] = self.faces.get(prim_id as usize)?;
+        let vertex = |i: u32| self.vertices.get(i as usize).copied();
+        Some([vertex(a)?, vertex(b)?, vertex(c)?])
+    }
+
+    #[inline(always)]
+    pub(super) fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
     /// A ray for the search.
     pub(crate) fn narrow(&self, ray: &DoubleRay) -> Narrowed {
         self.frame.ray(ray)
     }
 
-    fn is_degenerate(&self, prim_id: u32) -> bool {
+    pub(super) fn is_degenerate(&self, prim_id: u32) -> bool {
         !self.degenerate.is_empty() && self.degenerate.binary_search(&prim_id).is_ok()
     }
 

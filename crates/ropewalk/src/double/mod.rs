@@ -10,10 +10,13 @@
 mod brute_force;
 mod geometry;
 mod narrow;
+mod point;
 mod ray;
+mod rows;
 
 pub use crate::kernel::{DoubleAllHits, DoubleBatchHit, DoubleCaster, DoubleFilter};
 pub use brute_force::DoubleBruteForce;
 pub use geometry::{DoubleGeometry, DoubleGeometryError, DoubleTree};
 pub(crate) use narrow::{Narrowed, Place};
 pub use ray::{DoubleHit, DoubleRay};
+pub(crate) use rows::Rows;

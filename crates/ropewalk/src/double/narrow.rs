@@ -100,9 +100,28 @@ impl Frame {
         self.scaled(p).map(|x| x as f32)
     }
 
-    fn scaled(&self, p: [f64; 3]) -> [f64; 3] {
-        let scale = power(self.exponent);
+    /// The same without rounding to `f32`.
+    #[inline(always)]
+    pub fn scaled(&self, p: [f64; 3]) -> [f64; 3] {
+        let scale = self.scale();
         std::array::from_fn(|a| (p[a] - self.centre[a]) * scale)
+    }
+
+    /// A point of the search as it would have been given, rounded.
+    pub fn unscaled(&self, p: [f64; 3]) -> [f64; 3] {
+        std::array::from_fn(|a| p[a] * self.unit() + self.centre[a])
+    }
+
+    /// The power of two by which the scene is scaled.
+    #[inline(always)]
+    pub fn scale(&self) -> f64 {
+        power(self.exponent)
+    }
+
+    /// One over that.
+    #[inline(always)]
+    pub fn unit(&self) -> f64 {
+        power(-self.exponent)
     }
 
     /// A ray in the numbers of the search.

@@ -69,6 +69,9 @@ pub enum FileError {
         /// Its tag.
         section: Tag,
     },
+    /// A scene in `f64` where one in `f32` was asked for.
+    #[error("the scene is of double precision; one of single precision is needed here")]
+    Double,
     /// The owner's bytes do not begin at a multiple of the alignment of sections.
     #[error(
         "the bytes begin at an address that is no multiple of {alignment}; map the file, or copy them"

@@ -50,12 +50,27 @@ impl Tag {
     pub const ENDS: Tag = Tag(*b"ENDS");
     /// Numbers of primitives.
     pub const NUMBERS: Tag = Tag(*b"NUMS");
+    /// Vertices in `f64`.
+    pub const VERTICES: Tag = Tag(*b"VERT");
+    /// Numbers of the vertices of triangles.
+    pub const FACES: Tag = Tag(*b"FACE");
+    /// Box of the vertices in `f64`.
+    pub const BOX: Tag = Tag(*b"DBOX");
+    /// Triangles in `f64` without area.
+    pub const FLAT: Tag = Tag(*b"FLAT");
     /// Figures of the tree.
     pub const FIGURES: Tag = Tag(*b"stat");
 
     /// The sections whose checksums make the geometry's hash.
-    pub const GEOMETRY: [Tag; 5] =
-        [Tag::TRIANGLES, Tag::SIDES, Tag::KINDS, Tag::ENDS, Tag::NUMBERS];
+    pub const GEOMETRY: [Tag; 7] = [
+        Tag::TRIANGLES,
+        Tag::SIDES,
+        Tag::KINDS,
+        Tag::ENDS,
+        Tag::NUMBERS,
+        Tag::VERTICES,
+        Tag::FACES,
+    ];
 
     /// True if readers that do not know the section must refuse the file.
     pub fn is_required(self) -> bool {

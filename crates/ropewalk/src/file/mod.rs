@@ -20,9 +20,9 @@ pub use header::{
     FORMAT_VERSION, HEADER_BYTES, LAYOUT_VERSION, MAGIC, MAX_SECTIONS, SECTION_ALIGNMENT, Section,
     Tag,
 };
-pub use open::{Check, Extra, Opened, open};
+pub use open::{AnyOpened, Check, Extra, Opened, OpenedDouble, open, open_any};
 pub use shapes::{ShapeRows, read_shapes, write_shapes};
-pub use write::{Contents, Written, write};
+pub use write::{Contents, Primitives, Written, write};
 
 use crate::geometry::Geometry;
 
@@ -41,6 +41,11 @@ pub fn geometry_hash(geometry: &Geometry) -> Result<Hash, WriteError> {
 /// The [`geometry_hash()`] of triangles that are hit on both sides.
 pub fn triangles_hash(triangles: impl IntoIterator<Item = [[f32; 3]; 3]>) -> Hash {
     write::triangles_hash(triangles)
+}
+
+/// The hash of a geometry in `f64`: of its vertices and faces as they were given.
+pub fn mesh_hash(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Hash {
+    write::mesh_hash(vertices, faces)
 }
 
 /// A hash in hexadecimal, its first eight bytes.

@@ -6,6 +6,7 @@ use super::figures::Figures;
 use super::header::{Header, SECTION_ALIGNMENT, Section, Tag, compare};
 use super::links::Links;
 use super::shapes::read_shapes;
+use crate::double::{DoubleGeometry, DoubleTree, Rows};
 use crate::geometry::{Geometry, StoredTriangles};
 use crate::kernel::{Memory, SharedBytes};
 use crate::wide::{LINE, Lines, MAX_LINES, WideTree};
@@ -30,12 +31,12 @@ pub struct Extra {
 }
 
 /// A scene that has been opened.
-pub struct Opened {
+pub struct Opened<T = WideTree, G = Geometry> {
     /// The tree; it reads the bytes where they lie.
-    pub tree: WideTree,
+    pub tree: T,
     /// What it was built over. Triangles stay where they lie; where there are other primitives, all have
     /// been copied.
-    pub geometry: Geometry,
+    pub geometry: G,
     /// Figures of the build, if they were saved.
     pub figures: Option<Figures>,
     /// Sections that this module does not know, copied.
@@ -48,6 +49,28 @@ pub struct Opened {
     pub bytes: u64,
 }
 
+/// The same in `f64`.
+pub type OpenedDouble = Opened<DoubleTree, DoubleGeometry>;
+
+/// A scene of either precision that has been opened.
+pub enum AnyOpened {
+    /// Primitives in `f32`.
+    Single(Box<Opened>),
+    /// Triangles in `f64`.
+    Double(Box<OpenedDouble>),
+}
+
+/// Opens a scene in `f32`; see [`open_any`].
+///
+/// # Errors
+/// As there, and [`FileError::Double`] for one in `f64`.
+pub fn open(bytes: &SharedBytes, check: Check) -> Result<Opened, FileError> {
+    match open_any(bytes, check)? {
+        AnyOpened::Single(scene) => Ok(*scene),
+        AnyOpened::Double(_) => Err(FileError::Double),
+    }
+}
+
 /// Opens what [`write`](super::write()) wrote, wherever it lies; the owner is kept as long as the tree or the
 /// geometry lives. Its first byte must lie at a multiple of [`SECTION_ALIGNMENT`], as that of a map does.
 ///
@@ -56,7 +79,7 @@ pub struct Opened {
 ///
 /// # Errors
 /// [`FileError`] with the part of the file, the offset, and what was expected there.
-pub fn open(bytes: &SharedBytes, check: Check) -> Result<Opened, FileError> {
+pub fn open_any(bytes: &SharedBytes, check: Check) -> Result<AnyOpened, FileError> {
     if cfg!(target_endian = "big") {
         return Err(FileError::BigEndian);
     }
@@ -75,13 +98,39 @@ pub fn open(bytes: &SharedBytes, check: Check) -> Result<Opened, FileError> {
     let file = File { bytes, all, header: &header };
     file.known()?;
     let tree = file.tree()?;
-    let geometry = file.geometry()?;
+    let geometry = file.any_geometry()?;
     let figures = file.figures()?;
     let is_extra = |s: &&Section| !s.tag.is_required() && s.tag != Tag::FIGURES;
     let extra = header.sections.iter().filter(is_extra);
     let extra = extra.map(|s| Extra { tag: s.tag, bytes: all[s.range()].to_vec() }).collect();
+    let bytes = all.len() as u64;
     let Header { geometry_hash, sections, .. } = header;
-    Ok(Opened { tree, geometry, figures, extra, geometry_hash, sections, bytes: all.len() as u64 })
+    Ok(match geometry {
+        AnyGeometry::Single(geometry) => AnyOpened::Single(Box::new(Opened {
+            tree,
+            geometry,
+            figures,
+            extra,
+            geometry_hash,
+            sections,
+            bytes,
+        })),
+        AnyGeometry::Double(geometry) => AnyOpened::Double(Box::new(Opened {
+            tree: DoubleTree::of_file(tree),
+            geometry,
+            figures,
+            extra,
+            geometry_hash,
+            sections,
+            bytes,
+        })),
+    })
+}
+
+/// What a tree was built over.
+enum AnyGeometry {
+    Single(Geometry),
+    Double(DoubleGeometry),
 }
 
 /// A file whose header is right.
@@ -106,7 +155,9 @@ impl File<'_> {
 
     /// Each name once, none that must be known and is not, and one of the two ways of keeping primitives.
     fn known(&self) -> Result<(), FileError> {
-        const ALONE: [Tag; 3] = [Tag::TREE, Tag::OVERFLOW, Tag::FIGURES];
+        const ALONE: [Tag; 5] = [Tag::TREE, Tag::OVERFLOW, Tag::BOX, Tag::FLAT, Tag::FIGURES];
+        const DOUBLE: [Tag; 4] = [Tag::VERTICES, Tag::FACES, Tag::BOX, Tag::FLAT];
+        let is_double = self.section(Tag::VERTICES).is_some();
         for (i, section) in self.header.sections.iter().enumerate() {
             let tag = section.tag;
             let known = ALONE.contains(&tag) || Tag::GEOMETRY.contains(&tag);
@@ -115,6 +166,10 @@ impl File<'_> {
                 "a section that this version knows"
             } else if self.header.sections[..i].iter().any(|other| other.tag == tag) {
                 "one section of this name"
+            } else if DOUBLE.contains(&tag) != is_double
+                && (DOUBLE.contains(&tag) || Tag::GEOMETRY.contains(&tag))
+            {
+                "primitives in f32, or triangles in f64"
             } else if mixed && self.section(Tag::TRIANGLES).is_some() != (tag == Tag::SIDES) {
                 "triangles with their sides, or primitives of all kinds"
             } else {
@@ -163,6 +218,58 @@ impl File<'_> {
             u32::from_le_bytes([pair[at], pair[at + 1], pair[at + 2], pair[at + 3]])
         };
         Ok((pairs.iter().map(|pair| (half(pair, 0), half(pair, 4))).collect(), section.offset))
+    }
+
+    fn any_geometry(&self) -> Result<AnyGeometry, FileError> {
+        match self.section(Tag::VERTICES) {
+            Some(vertices) => self.double(vertices).map(AnyGeometry::Double),
+            None => self.geometry().map(AnyGeometry::Single),
+        }
+    }
+
+    /// Triangles in `f64`, where they lie.
+    fn double(&self, vertices: &Section) -> Result<DoubleGeometry, FileError> {
+        let header = self.header;
+        let get = |tag| self.section(tag).ok_or(FileError::Missing { section: tag });
+        let (faces, corners) = (get(Tag::FACES)?, get(Tag::BOX)?);
+        let flat = self.section(Tag::FLAT);
+        if !vertices.len.is_multiple_of(24) {
+            return Err(self.value(vertices, "its length", vertices.len, "a multiple of 24"));
+        }
+        if header.primitives == 0 || faces.len != 12 * header.primitives {
+            let expected = 12 * header.primitives.max(1);
+            return Err(self.value(faces, "its length", faces.len, expected));
+        }
+        let flat_bytes = flat.map_or(0, |flat| flat.len);
+        if flat_bytes != 4 * header.degenerate {
+            let Some(flat) = flat else { return Err(FileError::Missing { section: Tag::FLAT }) };
+            return Err(self.value(flat, "its length", flat_bytes, 4 * header.degenerate));
+        }
+        let (numbers, rest) = self.all[corners.range()].as_chunks::<8>();
+        let &[a, b, c, d, e, f] = numbers else {
+            return Err(self.value(corners, "its length", corners.len, 48));
+        };
+        let [min, max] = [[a, b, c], [d, e, f]].map(|p| p.map(f64::from_le_bytes));
+        let fits = |i: usize| {
+            min[i] <= max[i] && min[i].abs().max(max[i].abs()) <= DoubleGeometry::MAX_COORDINATE
+        };
+        if !rest.is_empty() || !(0..3).all(fits) {
+            let found = format!("{min:?} to {max:?}");
+            return Err(self.value(corners, "a box", found, "corners in order, at most 1e100"));
+        }
+        if header.has_shapes {
+            return Err(FileError::Missing { section: Tag::KINDS });
+        }
+        let unaligned = FileError::Unaligned { alignment: SECTION_ALIGNMENT };
+        let rows = (Rows::stored(self.memory(vertices)?), Rows::stored(self.memory(faces)?));
+        let flat = match flat {
+            Some(flat) => Rows::stored(self.memory(flat)?),
+            None => Some(Rows::Own(Vec::new())),
+        };
+        let ((Some(vertices), Some(faces)), Some(flat)) = (rows, flat) else {
+            return Err(unaligned);
+        };
+        Ok(DoubleGeometry::of_file((vertices, faces), flat, (min, max)))
     }
 
     fn geometry(&self) -> Result<Geometry, FileError> {

@@ -7,6 +7,7 @@ use super::header::{
 };
 use super::shapes::write_shapes;
 use super::{Extra, Hash};
+use crate::double::{DoubleGeometry, DoubleTree};
 use crate::geometry::{BACK, FRONT, Geometry, TRIANGLE_BYTES};
 use crate::primitive::Sides;
 use crate::wide::WideTree;
@@ -19,7 +20,7 @@ pub struct Contents<'a> {
     /// The tree.
     pub tree: &'a WideTree,
     /// What it was built over.
-    pub geometry: &'a Geometry,
+    pub geometry: Primitives<'a>,
     /// Figures of its build.
     pub figures: Option<&'a Figures>,
     /// Sections of others; their tags should begin with a small letter.
@@ -29,8 +30,23 @@ pub struct Contents<'a> {
 impl<'a> Contents<'a> {
     /// A tree and what it was built over.
     pub fn new(tree: &'a WideTree, geometry: &'a Geometry) -> Self {
+        Contents { tree, geometry: Primitives::Single(geometry), figures: None, extra: &[] }
+    }
+
+    /// The same in `f64`.
+    pub fn of_double(tree: &'a DoubleTree, geometry: &'a DoubleGeometry) -> Self {
+        let (tree, geometry) = (tree.wide(), Primitives::Double(geometry));
         Contents { tree, geometry, figures: None, extra: &[] }
     }
+}
+
+/// What a tree was built over.
+#[derive(Clone, Copy)]
+pub enum Primitives<'a> {
+    /// Primitives in `f32`.
+    Single(&'a Geometry),
+    /// Triangles in `f64`.
+    Double(&'a DoubleGeometry),
 }
 
 /// What was written.
@@ -113,6 +129,33 @@ fn geometry_sections(geometry: &Geometry) -> Result<Vec<(Tag, Source<'_>)>, Writ
     ])
 }
 
+/// The sections of a geometry in `f64` that make its hash.
+fn double_sections(geometry: &DoubleGeometry) -> Vec<(Tag, Source<'_>)> {
+    mesh_sections(geometry.vertices(), geometry.faces())
+}
+
+fn mesh_sections<'a>(vertices: &'a [[f64; 3]], faces: &'a [[u32; 3]]) -> Vec<(Tag, Source<'a>)> {
+    let bytes = |row: &'a [u8]| Source::Bytes(row.into());
+    vec![
+        (Tag::VERTICES, bytes(bytemuck::cast_slice(vertices))),
+        (Tag::FACES, bytes(bytemuck::cast_slice(faces))),
+    ]
+}
+
+/// What else is kept of a geometry in `f64`.
+fn more_double_sections(geometry: &DoubleGeometry) -> Vec<(Tag, Source<'_>)> {
+    let mut sections = Vec::new();
+    if let Some((min, max)) = geometry.bounds() {
+        let numbers = min.into_iter().chain(max).flat_map(f64::to_le_bytes);
+        sections.push((Tag::BOX, Source::Bytes(numbers.collect::<Vec<u8>>().into())));
+    }
+    if geometry.degenerate_count() > 0 {
+        let flat: &[u8] = bytemuck::cast_slice(geometry.degenerate());
+        sections.push((Tag::FLAT, Source::Bytes(flat.into())));
+    }
+    sections
+}
+
 /// Places sections one behind the other; the table.
 fn place(sources: &[(Tag, Source<'_>)]) -> Vec<Section> {
     let mut end = prefix_bytes(sources.len()) as u64;
@@ -145,19 +188,31 @@ pub fn write(contents: &Contents<'_>, out: &mut impl Write) -> Result<Written, W
         sources.push((Tag::OVERFLOW, Source::Bytes(bytes.to_vec().into())));
     }
     let first = sources.len();
-    sources.extend(geometry_sections(geometry)?);
+    sources.extend(match geometry {
+        Primitives::Single(geometry) => geometry_sections(geometry)?,
+        Primitives::Double(geometry) => double_sections(geometry),
+    });
     let of_geometry = first..sources.len();
+    let (geometry_bounds, primitives, degenerate) = match geometry {
+        Primitives::Single(geometry) => {
+            (geometry.bounds(), geometry.len(), geometry.degenerate_count())
+        }
+        Primitives::Double(geometry) => {
+            sources.extend(more_double_sections(geometry));
+            (*tree.bounds(), geometry.len(), geometry.degenerate_count())
+        }
+    };
     sources.extend(figures.map(|f| (Tag::FIGURES, Source::Bytes(f.to_bytes().into()))));
     sources.extend(extra.iter().map(|e| (e.tag, Source::Bytes(e.bytes[..].into()))));
     let sections = place(&sources);
     let header = Header {
         geometry_hash: hash_of(&sections[of_geometry]),
         tree_bounds: *tree.bounds(),
-        geometry_bounds: geometry.bounds(),
+        geometry_bounds,
         root: tree.root(),
         has_shapes: tree.has_shapes(),
-        primitives: geometry.len() as u64,
-        degenerate: geometry.degenerate_count() as u64,
+        primitives: primitives as u64,
+        degenerate: degenerate as u64,
         treelets: tree.treelets() as u64,
         blocks: tree.blocks() as u64,
         sections,
@@ -186,6 +241,10 @@ fn little_endian() -> Result<(), WriteError> {
 pub fn geometry_hash(geometry: &Geometry) -> Result<Hash, WriteError> {
     little_endian()?;
     Ok(hash_of(&place(&geometry_sections(geometry)?)))
+}
+
+pub fn mesh_hash(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Hash {
+    hash_of(&place(&mesh_sections(vertices, faces)))
 }
 
 pub fn triangles_hash(triangles: impl IntoIterator<Item = [[f32; 3]; 3]>) -> Hash {

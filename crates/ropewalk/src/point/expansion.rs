@@ -18,6 +18,9 @@ impl<const N: usize> Expansion<N> {
 
     /// Adds a number (Grow-Expansion); parts that vanish are left out.
     pub fn add(&mut self, term: f64) {
+        if term == 0.0 {
+            return;
+        }
         let (mut sum, mut kept) = (term, 0);
         for i in 0..self.len {
             // Two-Sum: `total + error` is `sum + part` exactly.
@@ -43,6 +46,13 @@ impl<const N: usize> Expansion<N> {
         let product = x * y;
         self.add(product);
         self.add(x.mul_add(y, -product));
+    }
+
+    /// Adds a product of three; neither it nor any rounding error may underflow.
+    pub fn add_product_of_three(&mut self, x: f64, y: f64, z: f64) {
+        let product = x * y;
+        self.add_product(product, z);
+        self.add_product(x.mul_add(y, -product), z);
     }
 
     /// -1, 0 or 1.
@@ -77,5 +87,14 @@ mod tests {
         assert_eq!(square.sign(), 1);
         square.add_product(-e, e);
         assert_eq!(square.sign(), 0);
+        // (1 + e)^3 is 1 + 3 e + 3 e^2 + e^3.
+        let mut cube = Expansion::<12>::new();
+        cube.add_product_of_three(1.0 + e, 1.0 + e, 1.0 + e);
+        cube.add(-(1.0 + 2.0 * e));
+        cube.add(-e);
+        cube.add_product(-3.0 * e, e);
+        assert_eq!(cube.sign(), 1);
+        cube.add_product(-e * e, e);
+        assert_eq!(cube.sign(), 0);
     }
 }

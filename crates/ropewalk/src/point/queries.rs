@@ -3,7 +3,7 @@
 use super::brute_force::{PointBruteForce, closest};
 use super::cells::{self, Cell};
 use super::order::along_curve;
-use super::{ClosestPoint, Side, WindingMoments};
+use super::{ClosestPoint, Side, Triangles, WindingMoments, is_near};
 use crate::aabb::Aabb;
 use crate::geometry::Geometry;
 use crate::kernel::point::{self, Found, Winding};
@@ -60,20 +60,29 @@ pub enum PointError {
 /// which side a triangle can be hit does not matter. Answers are those of [`PointBruteForce`] bit for
 /// bit at every [`Level`], in any order, and with any number of threads. Batches are answered along a curve
 /// through the tree's box, so points need no order of their own.
-#[derive(Clone, Copy)]
-pub struct PointQueries<'a> {
+pub struct PointQueries<'a, G = Geometry> {
     tree: &'a WideTree,
-    geometry: &'a Geometry,
+    geometry: &'a G,
     level: Level,
     threads: usize,
 }
 
-impl<'a> PointQueries<'a> {
-    /// Queries at the best level of this machine, on all threads of the current rayon pool.
+impl<G> Clone for PointQueries<'_, G> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<G> Copy for PointQueries<'_, G> {}
+
+impl<'a, G: Triangles> PointQueries<'a, G> {
+    /// Queries at the best level of this machine, on all threads of the current rayon pool. `tree` must have been
+    /// built over `geometry`.
     ///
     /// # Errors
     /// [`PointError::NotTriangles`] if a leaf of the tree holds anything else.
-    pub fn new(tree: &'a WideTree, geometry: &'a Geometry) -> Result<Self, PointError> {
+    pub fn new(tree: &'a G::Tree, geometry: &'a G) -> Result<Self, PointError> {
+        let tree = G::wide(tree);
         if tree.has_shapes() {
             return Err(PointError::NotTriangles);
         }
@@ -106,7 +115,8 @@ impl<'a> PointQueries<'a> {
         let all = self.in_order(points, nothing, |points, answers| {
             let found = self.found(points);
             for ((point, found), answer) in points.iter().zip(found).zip(answers) {
-                *answer = ClosestPoint { distance: found.distance2.sqrt(), ..nothing };
+                let distance = self.geometry.unscaled(found.distance2.sqrt());
+                *answer = ClosestPoint { distance, ..nothing };
                 if found.prim_id != u32::MAX {
                     *answer = closest(self.geometry, *point, found.distance2, found.prim_id);
                 }
@@ -124,7 +134,7 @@ impl<'a> PointQueries<'a> {
     pub fn distance(&self, points: &[[f64; 3]]) -> Vec<f64> {
         self.in_order(points, f64::NAN, |points, distances| {
             for (found, distance) in self.found(points).iter().zip(distances) {
-                *distance = found.distance2.sqrt();
+                *distance = self.geometry.unscaled(found.distance2.sqrt());
             }
         })
     }
@@ -135,7 +145,8 @@ impl<'a> PointQueries<'a> {
     /// surface the answer holds for that direction only; see [`PointQueries::winding_number`].
     pub fn sides(&self, points: &[[f64; 3]]) -> Vec<Side> {
         self.in_order(points, Side::Outside, |points, sides| {
-            point::sides(self.level, self.tree, points, sides, &mut NoEvents);
+            let scene = (self.tree, self.geometry);
+            point::sides(self.level, scene, points, sides, &mut NoEvents);
         })
     }
 
@@ -238,25 +249,47 @@ impl<'a> PointQueries<'a> {
         let accuracy = accuracy.max(0.0);
         let nothing = Winding { number: f64::NAN, error: f64::NAN };
         Ok(self.in_order(points, nothing, |points, found| {
-            point::winding(self.level, self.tree, moments, points, accuracy, found);
+            let scene = (self.tree, self.geometry);
+            point::winding(self.level, scene, moments, points, accuracy, found);
         }))
     }
 
     /// The leaf whose cell holds each point; a point in a plane belongs to the upper side. `None`
-    /// outside of the tree's box, and for NaN.
+    /// outside of the scene's box, and for NaN.
     pub fn locate(&self, points: &[[f64; 3]]) -> Vec<Option<Cell>> {
         let mut found = vec![None; points.len()];
         self.each(points, &mut found, TASK, |points, found| {
             for (point, cell) in points.iter().zip(found) {
-                *cell = cells::locate(self.tree, *point);
+                if !G::ROUNDED || self.is_within(*point) {
+                    *cell = cells::locate(self.tree, self.geometry.placed(*point));
+                }
             }
         });
         found
     }
 
-    /// The box of a leaf; `None` if the tree has no such leaf.
+    /// True in the box of all primitives; that of a tree of rounded ones is a little larger.
+    fn is_within(&self, point: [f64; 3]) -> bool {
+        let (p, [low, high]) = (self.geometry.scaled(point), self.geometry.extent());
+        (0..3).all(|a| low[a] <= p[a] && p[a] <= high[a])
+    }
+
+    /// The box of a leaf in the numbers of the tree; `None` if the tree has no such leaf.
     pub fn cell_box(&self, cell: Cell) -> Option<Aabb> {
         cells::cell_box(self.tree, cell)
+    }
+
+    /// The lower and upper corner of a leaf, rounded where the tree has numbers of its own; `None` if it has no such
+    /// leaf.
+    pub fn cell_corners(&self, cell: Cell) -> Option<[[f64; 3]; 2]> {
+        let bounds = self.cell_box(cell)?;
+        Some([bounds.min, bounds.max].map(|p| self.geometry.unplaced(p.map(f64::from))))
+    }
+
+    /// True if a point has an answer: its coordinates are numbers up to [`LARGEST`](super::LARGEST), and in an `f64`
+    /// scene also up to that many times the scene's size.
+    pub fn is_near(&self, point: &[f64; 3]) -> bool {
+        is_near(point) && is_near(&self.geometry.scaled(*point))
     }
 
     /// All leaves, empty ones included, in the order of their numbers.
@@ -273,21 +306,24 @@ impl<'a> PointQueries<'a> {
     /// tested beyond the boxes of their triangles, `clear` triangles in them near enough.
     pub fn closest_point_events(&self, points: &[[f64; 3]]) -> BatchEvents {
         let (mut found, mut events) = (vec![Found::INVALID; points.len()], BatchEvents::default());
-        point::nearest(self.level, self.tree, points, &mut found, &mut events);
+        let scene = (self.tree, self.geometry);
+        point::nearest(self.level, scene, points, &mut found, &mut events);
         events
     }
 
     /// What [`PointQueries::sides`] does, counted in the same way.
     pub fn sides_events(&self, points: &[[f64; 3]]) -> BatchEvents {
         let (mut sides, mut events) = (vec![Side::Outside; points.len()], BatchEvents::default());
-        point::sides(self.level, self.tree, points, &mut sides, &mut events);
+        let scene = (self.tree, self.geometry);
+        point::sides(self.level, scene, points, &mut sides, &mut events);
         events
     }
 
     /// The nearest triangles, one point after the other.
     fn found(&self, points: &[[f64; 3]]) -> Vec<Found> {
         let mut found = vec![Found::INVALID; points.len()];
-        point::nearest(self.level, self.tree, points, &mut found, &mut NoEvents);
+        let scene = (self.tree, self.geometry);
+        point::nearest(self.level, scene, points, &mut found, &mut NoEvents);
         found
     }
 
@@ -306,7 +342,14 @@ impl<'a> PointQueries<'a> {
         let mut found = vec![nothing; points.len().min(SORTED)];
         for (points, answers) in points.chunks(SORTED).zip(answers.chunks_mut(SORTED)) {
             let parallel = !self.is_serial(points, TASK);
-            let order = along_curve(points, self.tree.bounds(), parallel);
+            let placed;
+            let along = if G::ROUNDED {
+                placed = points.iter().map(|&p| self.geometry.placed(p)).collect::<Vec<_>>();
+                &placed
+            } else {
+                points
+            };
+            let order = along_curve(along, self.tree.bounds(), parallel);
             let sorted: Vec<[f64; 3]> = order.iter().map(|&i| points[i as usize]).collect();
             let found = &mut found[..points.len()];
             self.each(&sorted, found, TASK, &work);

@@ -40,8 +40,7 @@ pub fn flushed(point: [f64; 3]) -> [f64; 3] {
 
 /// What the ray from `p`, which must be [`flushed`], along +z does with a triangle that is not
 /// degenerate.
-pub fn crossing(p: [f64; 3], triangle: &[[f32; 3]; 3]) -> Crossing {
-    let [a, b, c] = triangle.map(|v| v.map(f64::from));
+pub fn crossing(p: [f64; 3], [a, b, c]: [[f64; 3]; 3]) -> Crossing {
     let low: [f64; 3] = std::array::from_fn(|i| a[i].min(b[i]).min(c[i]));
     let high: [f64; 3] = std::array::from_fn(|i| a[i].max(b[i]).max(c[i]));
     let within = |i: usize| low[i] <= p[i] && p[i] <= high[i];
@@ -77,8 +76,7 @@ fn holds(axis: usize, a: [f64; 3], b: [f64; 3], c: [f64; 3], p: [f64; 3]) -> boo
 /// roundings of 2^-53 each, twice over.
 pub const TURN_ERROR: f64 = 1.0 / (1u64 << 50) as f64;
 
-/// The sign of the area of `a`, `b`, `p` as seen along the axis that is not in `axes`; `a` and `b` are
-/// `f32` numbers.
+/// The sign of the area of `a`, `b`, `p` as seen along the axis that is not in `axes`.
 pub fn turn([x, y]: [usize; 2], a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> i32 {
     let m = (b[x] - a[x]) * (p[y] - a[y]);
     let n = (b[y] - a[y]) * (p[x] - a[x]);
@@ -88,9 +86,9 @@ pub fn turn([x, y]: [usize; 2], a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> i32 {
 
 #[cold]
 fn exact_turn([x, y]: [usize; 2], a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> i32 {
-    let mut area = Expansion::<10>::new();
-    area.add(a[x] * b[y]);
-    area.add(-a[y] * b[x]);
+    let mut area = Expansion::<12>::new();
+    area.add_product(a[x], b[y]);
+    area.add_product(-a[y], b[x]);
     area.add_product(b[x], p[y]);
     area.add_product(-a[x], p[y]);
     area.add_product(-b[y], p[x]);
@@ -113,7 +111,7 @@ fn moved_turn(a: [f64; 3], b: [f64; 3], p: [f64; 3]) -> i32 {
 /// products: some ten roundings, four times over.
 const PLANE_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
 
-/// The side of the plane of a triangle on which a point lies: 1 in front; vertices are `f32` numbers.
+/// The side of the plane of a triangle on which a point lies: 1 in front.
 pub fn side_of_plane(a: [f64; 3], b: [f64; 3], c: [f64; 3], p: [f64; 3]) -> i32 {
     let (mut sum, mut size) = (0.0, 0.0);
     for i in 0..3 {
@@ -130,16 +128,15 @@ pub fn side_of_plane(a: [f64; 3], b: [f64; 3], c: [f64; 3], p: [f64; 3]) -> i32 
 /// The normal is `a x b + b x c + c x a`, and its product with `a` is `(b x c) a`.
 #[cold]
 fn exact_side_of_plane(v: [[f64; 3]; 3], p: [f64; 3]) -> i32 {
-    let mut sum = Expansion::<48>::new();
+    let mut sum = Expansion::<96>::new();
     for i in 0..3 {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         for e in 0..3 {
-            // Products of two `f32` numbers are exact.
             let (from, to) = (v[e], v[(e + 1) % 3]);
-            for product in [from[j] * to[k], -from[k] * to[j]] {
-                sum.add_product(product, p[i]);
+            for (x, y) in [(from[j], to[k]), (-from[k], to[j])] {
+                sum.add_product_of_three(x, y, p[i]);
                 if e == 1 {
-                    sum.add_product(-product, v[0][i]);
+                    sum.add_product_of_three(-x, y, v[0][i]);
                 }
             }
         }

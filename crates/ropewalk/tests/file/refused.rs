@@ -1,5 +1,6 @@
 //! Bytes that are no sound scene, and what is said about them.
 
+use crate::double::ReadyDouble;
 use crate::property::{opens_or_refuses, repair, shared};
 use crate::scenes::{Ready, all, coincident, soup};
 use ropewalk::file::{Check, FileError, HEADER_BYTES, Opened, Section, Tag, open};
@@ -348,6 +349,8 @@ fn the_fuzz_corpus_is_opened() {
         assert_eq!(found, expected, "{name}");
         assert!(opens_or_refuses(&bytes), "{name}");
     }
+    let bytes = std::fs::read(corpus().join("double.rope")).unwrap();
+    assert!(opens_or_refuses(&bytes) && bytes == ReadyDouble::new(30, 5).bytes());
 }
 
 #[test]
@@ -357,6 +360,7 @@ fn write_corpus() {
     for (name, ready) in small() {
         std::fs::write(corpus().join(format!("{name}.rope")), ready.bytes()).unwrap();
     }
+    std::fs::write(corpus().join("double.rope"), ReadyDouble::new(30, 5).bytes()).unwrap();
 }
 
 fn corpus() -> std::path::PathBuf {

@@ -2,6 +2,7 @@
 
 mod cells;
 mod closest;
+mod double;
 mod meshes;
 mod sides;
 mod winding;

@@ -1,8 +1,9 @@
 //! Surfaces and points around them.
 
 use ropewalk::build::{BuildSettings, Preset};
+use ropewalk::double::{DoubleGeometry, DoubleTree};
 use ropewalk::kernel::Level;
-use ropewalk::point::{PointBruteForce, PointQueries};
+use ropewalk::point::{PointBruteForce, PointQueries, Triangles as PointTriangles};
 use ropewalk::primitive::{Primitive, Triangle};
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Shape, Sides};
@@ -34,19 +35,41 @@ pub fn trees(draw: &mut Draw, geometry: &Geometry) -> [WideTree; 2] {
 }
 
 /// Queries at each level of this machine, on one thread and on all.
-pub fn queries<'a>(tree: &'a WideTree, geometry: &'a Geometry) -> Vec<PointQueries<'a>> {
+pub fn queries<'a, G: PointTriangles>(
+    tree: &'a G::Tree,
+    geometry: &'a G,
+) -> Vec<PointQueries<'a, G>> {
     let queries = PointQueries::new(tree, geometry).unwrap();
     let levels = Level::ALL.into_iter().filter_map(|level| queries.with_level(level));
     levels.flat_map(|queries| [queries, queries.with_threads(1)]).collect()
 }
 
+/// Triangles in `f64`, scaled and moved; equal points stay equal.
+pub fn double_geometry(triangles: &Triangles, (scale, offset): (f64, f64)) -> DoubleGeometry {
+    let place = |p: [f64; 3]| p.map(|x| x * scale + offset);
+    let vertices = triangles.iter().flatten().map(|&p| place(p)).collect();
+    let faces = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    DoubleGeometry::from_triangles(vertices, faces).unwrap()
+}
+
+/// Trees of two presets.
+pub fn double_trees(geometry: &DoubleGeometry) -> [DoubleTree; 2] {
+    [Preset::Balanced, Preset::Fast]
+        .map(|preset| geometry.build(&BuildSettings::preset(preset), &()).unwrap().0)
+}
+
 /// All queries against brute force.
 pub fn check(draw: &mut Draw, geometry: &Geometry, points: &[[f64; 3]]) {
+    check_trees(&trees(draw, geometry), geometry, points);
+}
+
+/// The same over given trees.
+pub fn check_trees<G: PointTriangles>(trees: &[G::Tree], geometry: &G, points: &[[f64; 3]]) {
     let oracle = PointBruteForce { geometry };
     let closest: Vec<_> = points.iter().map(|&p| oracle.closest_point(p)).collect();
     let sides: Vec<_> = points.iter().map(|&p| oracle.side(p)).collect();
-    for tree in trees(draw, geometry) {
-        for queries in queries(&tree, geometry) {
+    for tree in trees {
+        for queries in queries(tree, geometry) {
             let (found, distance) = (queries.closest_point(points), queries.distance(points));
             let (is, signed) = (queries.sides(points), queries.signed_distance(points));
             for (i, point) in points.iter().enumerate() {
@@ -70,17 +93,27 @@ pub fn check(draw: &mut Draw, geometry: &Geometry, points: &[[f64; 3]]) {
 /// Points in and around a scene: anywhere, far away, on and beside vertices, edges and faces, and made
 /// of the coordinates of vertices.
 pub fn points(draw: &mut Draw, geometry: &Geometry, count: usize) -> Vec<[f64; 3]> {
-    let bounds = geometry.bounds();
-    let triangles: Vec<[[f64; 3]; 3]> = (0..geometry.len() as u32)
+    let triangles: Triangles = (0..geometry.len() as u32)
         .filter_map(|id| match geometry.shape(id) {
             Shape::Triangle(t) => Some(t.vertices.map(|v| v.map(f64::from))),
             _ => None,
         })
         .collect();
+    points_around(draw, &triangles, count)
+}
+
+/// The same around some triangles.
+pub fn points_around(draw: &mut Draw, triangles: &Triangles, count: usize) -> Vec<[f64; 3]> {
     if triangles.is_empty() {
         return vec![[0.0; 3], [1.0, 2.0, 3.0]];
     }
-    let size = bounds.diagonal();
+    let (mut min, mut max) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for p in triangles.iter().flatten() {
+        for a in 0..3 {
+            (min[a], max[a]) = (min[a].min(p[a]), max[a].max(p[a]));
+        }
+    }
+    let size = (0..3).map(|a| (max[a] - min[a]).powi(2)).sum::<f64>().sqrt();
     let mut points = Vec::new();
     for _ in 0..count {
         let [a, b, c] = triangles[draw.below(triangles.len())];
@@ -88,7 +121,8 @@ pub fn points(draw: &mut Draw, geometry: &Geometry, count: usize) -> Vec<[f64; 3
         let near = |d: &mut Draw, p: [f64; 3]| p.map(|x| x + d.uniform(-spread, spread));
         let mix =
             |u: f64, v: f64| std::array::from_fn(|i| a[i] * (1.0 - u - v) + b[i] * u + c[i] * v);
-        let inside = draw.point_in(&bounds).map(f64::from);
+        let inside: [f64; 3] =
+            std::array::from_fn(|a| min[a] + draw.uniform(0.0, 1.0) * (max[a] - min[a]));
         let far = inside.map(|x| x + size * draw.uniform(-20.0, 20.0));
         let picked =
             std::array::from_fn(|i| triangles[draw.below(triangles.len())][draw.below(3)][i]);
@@ -106,6 +140,11 @@ pub fn points(draw: &mut Draw, geometry: &Geometry, count: usize) -> Vec<[f64; 3
         ]);
     }
     points
+}
+
+/// The triangles of a geometry in `f64`.
+pub fn triangles_of(geometry: &DoubleGeometry) -> Triangles {
+    (0..geometry.len() as u32).map(|id| geometry.triangle(id)).collect()
 }
 
 /// True if all triangles of a scene have an area.

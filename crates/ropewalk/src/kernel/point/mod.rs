@@ -6,7 +6,9 @@
 //! column    all cells that the ray from the point along +z touches, plane by plane
 //! winding   down to cells that are far enough for their moments, and to all triangles near by
 //! ```
-//! In a leaf, eight triangles at a time are looked at by their boxes first. What is found is defined without a tree in `triangle` and [`crate::point`]; brute force uses the same.
+//! In a leaf, eight triangles at a time are looked at by their boxes first. What is found is defined without a tree in `triangle` and
+//! [`crate::point`]; brute force uses the same. Where the tree's triangles are rounded they are candidates, and those of the
+//! geometry decide.
 
 #![allow(unsafe_code)]
 
@@ -23,7 +25,7 @@ use super::beam::BeamSimd;
 use super::events::Events;
 use super::level::Level;
 use super::scalar::Scalar;
-use crate::point::{Side, WindingMoments};
+use crate::point::{Side, Triangles, WindingMoments};
 use crate::tree::MAX_DEPTH;
 use crate::wide::{LEVELS, WideTree};
 
@@ -31,53 +33,53 @@ use crate::wide::{LEVELS, WideTree};
 const STACK: usize = MAX_DEPTH.next_multiple_of(LEVELS) + 1;
 
 /// The nearest triangle of each point, at a level that this machine has.
-pub fn nearest<E: Events>(
+pub fn nearest<E: Events, G: Triangles>(
     level: Level,
-    tree: &WideTree,
+    scene: (&WideTree, &G),
     points: &[[f64; 3]],
     found: &mut [Found],
     events: &mut E,
 ) {
     match level {
         // SAFETY: portable code.
-        Level::Scalar => unsafe { nearest::nearest::<Scalar, E>(tree, points, found, events) },
+        Level::Scalar => unsafe { nearest::nearest::<Scalar, E, G>(scene, points, found, events) },
         // SAFETY: the caller gives only levels that this machine has.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2 => unsafe { nearest_avx2(tree, points, found, events) },
+        Level::Avx2 => unsafe { nearest_avx2(scene, points, found, events) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => unsafe { nearest_avx512(tree, points, found, events) },
+        Level::Avx512 => unsafe { nearest_avx512(scene, points, found, events) },
         #[cfg(not(target_arch = "x86_64"))]
         _ => unreachable!("only available levels can be chosen"),
     }
 }
 
 /// On which side of the surface each point is, at a level that this machine has.
-pub fn sides<E: Events>(
+pub fn sides<E: Events, G: Triangles>(
     level: Level,
-    tree: &WideTree,
+    scene: (&WideTree, &G),
     points: &[[f64; 3]],
     sides: &mut [Side],
     events: &mut E,
 ) {
     match level {
         // SAFETY: portable code.
-        Level::Scalar => unsafe { column::sides::<Scalar, E>(tree, points, sides, events) },
+        Level::Scalar => unsafe { column::sides::<Scalar, E, G>(scene, points, sides, events) },
         // SAFETY: the caller gives only levels that this machine has.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2 => unsafe { sides_avx2(tree, points, sides, events) },
+        Level::Avx2 => unsafe { sides_avx2(scene, points, sides, events) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => unsafe { sides_avx512(tree, points, sides, events) },
+        Level::Avx512 => unsafe { sides_avx512(scene, points, sides, events) },
         #[cfg(not(target_arch = "x86_64"))]
         _ => unreachable!("only available levels can be chosen"),
     }
 }
 
 /// The winding number of each point by moments, at a level that this machine has.
-pub fn winding(
+pub fn winding<G: Triangles>(
     level: Level,
-    tree: &WideTree,
+    scene: (&WideTree, &G),
     moments: &WindingMoments,
     points: &[[f64; 3]],
     accuracy: f64,
@@ -86,11 +88,11 @@ pub fn winding(
     match level {
         // SAFETY: the caller gives only levels that this machine has.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx2 => unsafe { winding_avx2(tree, moments, points, accuracy, found) },
+        Level::Avx2 => unsafe { winding_avx2(scene, moments, points, accuracy, found) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => unsafe { winding_avx512(tree, moments, points, accuracy, found) },
-        _ => winding::winding(tree, moments, points, accuracy, found),
+        Level::Avx512 => unsafe { winding_avx512(scene, moments, points, accuracy, found) },
+        _ => winding::winding(scene, moments, points, accuracy, found),
     }
 }
 
@@ -98,38 +100,38 @@ macro_rules! instantiate {
     ($nearest:ident, $sides:ident, $winding:ident, $level:ty, $features:literal) => {
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
-        fn $winding(
-            tree: &WideTree,
+        fn $winding<G: Triangles>(
+            scene: (&WideTree, &G),
             moments: &WindingMoments,
             points: &[[f64; 3]],
             accuracy: f64,
             found: &mut [Winding],
         ) {
-            winding::winding(tree, moments, points, accuracy, found);
+            winding::winding(scene, moments, points, accuracy, found);
         }
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
-        fn $nearest<E: Events>(
-            tree: &WideTree,
+        fn $nearest<E: Events, G: Triangles>(
+            scene: (&WideTree, &G),
             points: &[[f64; 3]],
             found: &mut [Found],
             events: &mut E,
         ) {
             // SAFETY: this function enables the level's features.
-            unsafe { nearest::nearest::<$level, E>(tree, points, found, events) }
+            unsafe { nearest::nearest::<$level, E, G>(scene, points, found, events) }
         }
 
         #[cfg(target_arch = "x86_64")]
         #[target_feature(enable = $features)]
-        fn $sides<E: Events>(
-            tree: &WideTree,
+        fn $sides<E: Events, G: Triangles>(
+            scene: (&WideTree, &G),
             points: &[[f64; 3]],
             sides: &mut [Side],
             events: &mut E,
         ) {
             // SAFETY: this function enables the level's features.
-            unsafe { column::sides::<$level, E>(tree, points, sides, events) }
+            unsafe { column::sides::<$level, E, G>(scene, points, sides, events) }
         }
     };
 }

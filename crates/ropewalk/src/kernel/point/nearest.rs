@@ -3,11 +3,11 @@
 #![allow(unsafe_code)]
 
 use super::step::{Children, Place, PointSimd};
-use super::triangle::{box_distance2, distance2};
+use super::triangle::{box_distance2, distance2, nearest_foot};
 use crate::kernel::beam::Doubles;
 use crate::kernel::events::Events;
 use crate::kernel::exact::{At, place};
-use crate::point::is_near;
+use crate::point::{ROUNDING, Triangles, is_near};
 use crate::wide::{
     BLOCK_LINES, Block, ID_MASK, LEAF, MAX_WIDE_DEPTH, WIDTH, WideTree, code_line, code_offset,
 };
@@ -15,7 +15,7 @@ use crate::wide::{
 /// The triangle nearest to a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Found {
-    /// Its squared distance; infinite without a triangle, NaN for a point that is none.
+    /// Its squared distance, scaled; infinite without a triangle, NaN for a point that is none.
     pub distance2: f64,
     /// Its id; `u32::MAX` without one.
     pub prim_id: u32,
@@ -38,11 +38,12 @@ impl Found {
 /// (docs/numerics.md).
 const SLACK: f64 = 1.0 / (1u64 << 44) as f64;
 
-/// The largest squared distance of a cell that may hold a triangle as near as the best one.
+/// The largest squared distance of a cell that may hold a triangle as near as the best one, or of a triangle
+/// that is moved by up to `rounding`.
 #[inline(always)]
-fn limit(distance2: f64, diagonal: f64) -> f64 {
+fn limit(distance2: f64, diagonal: f64, rounding: f64) -> f64 {
     let distance = distance2.sqrt();
-    let far = distance + SLACK * (distance + diagonal);
+    let far = distance + SLACK * (distance + diagonal) + rounding;
     far * far
 }
 
@@ -76,8 +77,8 @@ struct Entry {
 /// # Safety
 /// The machine must have the features of `L`, and the caller must enable them.
 #[inline(always)]
-pub unsafe fn nearest<L: PointSimd, E: Events>(
-    tree: &WideTree,
+pub unsafe fn nearest<L: PointSimd, E: Events, G: Triangles>(
+    (tree, geometry): (&WideTree, &G),
     points: &[[f64; 3]],
     found: &mut [Found],
     events: &mut E,
@@ -86,13 +87,52 @@ pub unsafe fn nearest<L: PointSimd, E: Events>(
     let mut stack = [Entry { along: [0.0; 3], distance2: 0.0, code: 0 }; CELLS];
     let mut seed = Found::NOTHING;
     for (point, out) in points.iter().zip(found) {
-        if !is_near(point) {
+        let asked = Asked::new(geometry, *point, diagonal);
+        if !is_near(point) || !is_near(&asked.scaled) {
             *out = Found::INVALID;
             continue;
         }
         // SAFETY: passed on to the caller.
-        *out = unsafe { walk::<L, E>(tree, *point, diagonal, seed, &mut stack, events) };
+        *out = unsafe { walk::<L, E, G>(tree, &asked, seed, &mut stack, events) };
         seed = *out;
+    }
+}
+
+/// A point, and what it is asked about.
+struct Asked<'a, G> {
+    geometry: &'a G,
+    /// In the numbers of the tree.
+    placed: [f64; 3],
+    scaled: [f64; 3],
+    /// Of the tree's box.
+    diagonal: f64,
+}
+
+impl<'a, G: Triangles> Asked<'a, G> {
+    #[inline(always)]
+    fn new(geometry: &'a G, point: [f64; 3], diagonal: f64) -> Self {
+        let (placed, scaled) = (geometry.placed(point), geometry.scaled(point));
+        Asked { geometry, placed, scaled, diagonal }
+    }
+
+    /// The squared distance of a triangle; the tree's `corners` are its corners unless they are rounded.
+    #[inline(always)]
+    fn distance2(&self, prim_id: u32, corners: impl FnOnce() -> [[f64; 3]; 3]) -> f64 {
+        if !G::ROUNDED {
+            // SAFETY: portable code.
+            return unsafe { distance2(self.placed, corners()) };
+        }
+        let corners = self.geometry.corners(prim_id);
+        corners.map_or(f64::INFINITY, |corners| nearest_foot(self.scaled, corners).distance2)
+    }
+
+    /// The largest squared distance, as the tree has it, of a triangle that may be as near as one at
+    /// `distance2`; and of a cell that may refer to one.
+    #[inline(always)]
+    fn limits(&self, distance2: f64) -> (f64, f32) {
+        let cell = limit(distance2, self.diagonal, 0.0);
+        let triangle = if G::ROUNDED { limit(distance2, self.diagonal, ROUNDING) } else { cell };
+        (triangle, cell_limit(cell))
     }
 }
 
@@ -101,10 +141,9 @@ pub unsafe fn nearest<L: PointSimd, E: Events>(
 /// # Safety
 /// As for [`nearest`].
 #[inline(always)]
-unsafe fn walk<L: PointSimd, E: Events>(
+unsafe fn walk<L: PointSimd, E: Events, G: Triangles>(
     tree: &WideTree,
-    point: [f64; 3],
-    diagonal: f64,
+    asked: &Asked<'_, G>,
     seed: Found,
     stack: &mut [Entry; CELLS],
     events: &mut E,
@@ -114,16 +153,13 @@ unsafe fn walk<L: PointSimd, E: Events>(
         return best;
     }
     events.rays(1);
-    let lines = tree.lines();
-    let mut farthest = f64::MAX;
+    let (lines, point) = (tree.lines(), asked.placed);
+    let (mut farthest, mut near) = (f64::MAX, cell_limit(f64::MAX));
     if seed.at != NONE {
         let (block, lane) = (lines.block(seed.at as usize / WIDTH), seed.at as usize % WIDTH);
-        // SAFETY: portable code.
-        let distance2 = unsafe { distance2(point, corners(block, lane)) };
-        best = Found { distance2, ..seed };
-        farthest = limit(distance2, diagonal);
+        best = Found { distance2: asked.distance2(seed.prim_id, || corners(block, lane)), ..seed };
+        (farthest, near) = asked.limits(best.distance2);
     }
-    let mut near = cell_limit(farthest);
     let mut along = [0.0; 3];
     for a in 0..3 {
         let (low, high) = (f64::from(tree.bounds().min[a]), f64::from(tree.bounds().max[a]));
@@ -173,9 +209,8 @@ unsafe fn walk<L: PointSimd, E: Events>(
             events.block();
             let block = lines.block(line);
             // SAFETY: passed on to the caller.
-            if unsafe { look::<L, E>(point, block, line, farthest, &mut best, events) } {
-                farthest = limit(best.distance2, diagonal);
-                near = cell_limit(farthest);
+            if unsafe { look::<L, E, G>(asked, block, line, farthest, &mut best, events) } {
+                (farthest, near) = asked.limits(best.distance2);
             }
         }
     }
@@ -187,15 +222,15 @@ unsafe fn walk<L: PointSimd, E: Events>(
 /// # Safety
 /// As for [`nearest`].
 #[inline(always)]
-unsafe fn look<L: PointSimd, E: Events>(
-    point: [f64; 3],
+unsafe fn look<L: PointSimd, E: Events, G: Triangles>(
+    asked: &Asked<'_, G>,
     block: &Block,
     line: usize,
     farthest: f64,
     best: &mut Found,
     events: &mut E,
 ) -> bool {
-    let before = best.distance2;
+    let (before, point) = (best.distance2, asked.placed);
     for first in (0..WIDTH).step_by(L::Doubles::LANES) {
         // SAFETY: passed on to the caller; `LANES` divides `WIDTH`.
         unsafe {
@@ -214,7 +249,8 @@ unsafe fn look<L: PointSimd, E: Events>(
             }
             events.found(near, 0);
             let all = distance2(p, [a, b, c]);
-            let mut lanes = all.le(L::Doubles::splat(best.distance2));
+            let reach = if G::ROUNDED { farthest } else { best.distance2 };
+            let mut lanes = all.le(L::Doubles::splat(reach));
             if lanes == 0 {
                 continue;
             }
@@ -222,13 +258,22 @@ unsafe fn look<L: PointSimd, E: Events>(
             all.store(&mut row);
             while lanes != 0 {
                 let i = lanes.trailing_zeros() as usize % WIDTH;
-                let (lane, distance2) = (first + i, row[i]);
+                let lane = first + i;
                 let prim_id = block.id[lane % WIDTH] & ID_MASK;
+                lanes &= lanes - 1;
+                if G::ROUNDED && prim_id == best.prim_id {
+                    continue;
+                }
+                // A rounded distance only says which triangles to measure.
+                let distance2 = if G::ROUNDED {
+                    asked.distance2(prim_id, || corners(block, lane))
+                } else {
+                    row[i]
+                };
                 let is_first = distance2 == best.distance2 && prim_id < best.prim_id;
                 if distance2 < best.distance2 || is_first {
                     *best = Found { distance2, prim_id, at: place(line, lane) };
                 }
-                lanes &= lanes - 1;
             }
         }
     }

@@ -77,9 +77,9 @@ pub unsafe fn box_distance2<D: Doubles>(p: [D; 3], [a, b, c]: [[D; 3]; 3]) -> D 
 }
 
 /// The nearest point of a triangle: the first of the nearest of [`feet`].
-pub fn nearest_foot(p: [f64; 3], triangle: &[[f32; 3]; 3]) -> Foot<f64> {
+pub fn nearest_foot(p: [f64; 3], triangle: [[f64; 3]; 3]) -> Foot<f64> {
     // SAFETY: portable code.
-    let [ab, bc, ac, inside] = unsafe { feet(p, triangle.map(|v| v.map(f64::from))) };
+    let [ab, bc, ac, inside] = unsafe { feet(p, triangle) };
     let mut nearest = ab;
     for foot in [bc, ac, inside] {
         if foot.distance2 < nearest.distance2 {

@@ -4,8 +4,10 @@
 
 #![allow(unsafe_code)]
 
-use crate::point::{Moments, NOTHING, WindingMoments, half_angle, is_near, tangent};
-use crate::wide::{BLOCK_LINES, Block, LEAF, WIDTH, WideTree, code_line};
+use crate::point::{
+    Moments, NOTHING, Triangles, WindingMoments, half_angle, half_solid_angle, is_near, tangent,
+};
+use crate::wide::{BLOCK_LINES, Block, ID_MASK, LEAF, WIDTH, WideTree, code_line};
 use std::f64::consts::TAU;
 
 /// A winding number and how far it may be from the sum over all triangles.
@@ -40,8 +42,8 @@ const ROUNDING: f64 = 1.0 / (1u64 << 48) as f64;
 
 /// The winding number of each point, off by `accuracy` at most where that is above rounding.
 #[inline(always)]
-pub fn winding(
-    tree: &WideTree,
+pub fn winding<G: Triangles>(
+    scene: (&WideTree, &G),
     moments: &WindingMoments,
     points: &[[f64; 3]],
     accuracy: f64,
@@ -49,8 +51,8 @@ pub fn winding(
 ) {
     let mut stack = Vec::new();
     for (point, out) in points.iter().zip(found) {
-        *out = if is_near(point) {
-            walk(tree, moments, *point, accuracy, &mut stack)
+        *out = if is_near(point) && is_near(&scene.1.scaled(*point)) {
+            walk(scene, moments, *point, accuracy, &mut stack)
         } else {
             Winding { number: f64::NAN, error: f64::NAN }
         };
@@ -58,13 +60,14 @@ pub fn winding(
 }
 
 #[inline(always)]
-fn walk(
-    tree: &WideTree,
+fn walk<G: Triangles>(
+    (tree, geometry): (&WideTree, &G),
     moments: &WindingMoments,
     point: [f64; 3],
     accuracy: f64,
     stack: &mut Vec<Part>,
 ) -> Winding {
+    let (placed, scaled) = (geometry.placed(point), geometry.scaled(point));
     // `far` times 4 pi, `near` times 2 pi; `size` of all that is summed, times 4 pi.
     let (mut far, mut near, mut error, mut size) = (0.0, 0.0, 0.0, 0.0);
     // What parts were allowed and did not need.
@@ -81,7 +84,11 @@ fn walk(
             for i in 0..tree.block_count(leaf.code) as usize {
                 let lanes = moments.lanes[leaf.first as usize + i];
                 let block = tree.lines().block(first + i * BLOCK_LINES);
-                let (sum, absolute) = angles(block, lanes, point);
+                let (sum, absolute) = if G::ROUNDED {
+                    scaled_angles(geometry, block, lanes, scaled)
+                } else {
+                    angles(block, lanes, placed)
+                };
                 near += sum;
                 size += 2.0 * absolute;
             }
@@ -89,7 +96,7 @@ fn walk(
             continue;
         }
         let cell = &moments.treelets[part.code as usize];
-        let seen = see(cell, point);
+        let seen = see(cell, placed);
         let (mut bounds, mut roots) = (0.0, 0.0);
         for c in 0..WIDTH {
             bounds += seen.bound[c];
@@ -190,6 +197,28 @@ fn see(cell: &Moments, [px, py, pz]: [f64; 3]) -> Seen {
         seen.size[c] = if is_far { rho2 * area * near2 } else { f64::INFINITY };
     }
     seen
+}
+
+/// The same as [`angles`] of the triangles that those of the block stand for.
+#[inline(always)]
+fn scaled_angles<G: Triangles>(
+    geometry: &G,
+    block: &Block,
+    lanes: u8,
+    point: [f64; 3],
+) -> (f64, f64) {
+    let (mut sum, mut size) = (0.0, 0.0);
+    let mut rest = lanes;
+    while rest != 0 {
+        let lane = rest.trailing_zeros() as usize % WIDTH;
+        rest &= rest - 1;
+        if let Some(corners) = geometry.corners(block.id[lane] & ID_MASK) {
+            let angle = half_solid_angle(point, corners);
+            sum += angle;
+            size += angle.abs();
+        }
+    }
+    (sum, size)
 }
 
 /// The sum of half of the solid angles in some lanes of a block, and of their sizes.

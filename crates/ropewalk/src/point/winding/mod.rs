@@ -7,7 +7,7 @@ pub use moments::WindingMoments;
 pub(crate) use moments::{Moments, NOTHING};
 
 /// The sum of the signed solid angles of triangles, seen from a point, over 4 pi.
-pub fn winding_number(point: [f64; 3], triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> f64 {
+pub fn winding_number(point: [f64; 3], triangles: impl Iterator<Item = [[f64; 3]; 3]>) -> f64 {
     let halves: f64 = triangles.map(|triangle| half_solid_angle(point, triangle)).sum();
     // -0.0 where there is nothing.
     halves / std::f64::consts::TAU + 0.0
@@ -16,8 +16,8 @@ pub fn winding_number(point: [f64; 3], triangles: impl Iterator<Item = [[f32; 3]
 /// Half of the solid angle of a triangle, positive where its back is seen: from inside of a surface
 /// whose front is outside (van Oosterom and Strackee, 1983). 0 from its plane, also from the triangle
 /// itself, so that a point on a closed surface gets the mean of both sides.
-fn half_solid_angle(point: [f64; 3], triangle: [[f32; 3]; 3]) -> f64 {
-    let [a, b, c] = triangle.map(|v| std::array::from_fn(|i| f64::from(v[i]) - point[i]));
+pub(crate) fn half_solid_angle(point: [f64; 3], triangle: [[f64; 3]; 3]) -> f64 {
+    let [a, b, c] = triangle.map(|v| std::array::from_fn(|i| v[i] - point[i]));
     half_angle(tangent(a, b, c))
 }
 

@@ -20,8 +20,7 @@
 //! ```
 //! Deviation: the paper opens a cell by its distance over its radius alone and bounds nothing.
 
-use crate::geometry::Geometry;
-use crate::primitive::Shape;
+use crate::point::Triangles;
 use crate::wide::{ID_MASK, LEAF, LEVELS, WideTree, code_line};
 use rayon::prelude::*;
 
@@ -78,10 +77,14 @@ pub struct WindingMoments {
 
 impl WindingMoments {
     /// Takes the moments of a tree of triangles in `O(N log N)`; on the current rayon pool if `parallel`.
-    pub(crate) fn new(tree: &WideTree, geometry: &Geometry, parallel: bool) -> WindingMoments {
+    pub(crate) fn new<G: Triangles>(
+        tree: &WideTree,
+        geometry: &G,
+        parallel: bool,
+    ) -> WindingMoments {
         let mut plan = Plan {
             tree,
-            seen: vec![false; geometry.len()],
+            seen: vec![false; geometry.count()],
             order: Vec::new(),
             ranges: Vec::new(),
             children: Vec::new(),
@@ -182,6 +185,16 @@ impl Plan<'_> {
 /// What rounding to `f32` may take from a number, upwards.
 const UP: f64 = 1.0 + 1.0 / (1 << 20) as f64;
 
+/// By how much rounding in `f64` moves placed corners and points near by, together.
+const PLACING: f64 = 1.0 / (1u64 << 50) as f64;
+
+/// An area that rounding sweeps counts as so much that is rounded as moments are, by `2^-24`, and at least twice
+/// (docs/numerics.md).
+const SWEPT: f64 = (1 << 23) as f64;
+
+/// The least radius of rounded triangles; [`PLACING`] is nothing beside it.
+const LEAST_RADIUS: f32 = 1.0 / (1u64 << 40) as f32;
+
 impl Moments {
     const EMPTY: Moments = Moments {
         center: [[0.0; CHILDREN]; 3],
@@ -195,12 +208,9 @@ impl Moments {
     };
 
     /// The moments of a child's triangles.
-    fn take(&mut self, c: usize, geometry: &Geometry, ids: &[u32]) {
-        let corners = |&id: &u32| match geometry.shape(id) {
-            Shape::Triangle(t) => t.vertices.map(|v| v.map(f64::from)),
-            // There are none in a tree of triangles.
-            _ => [[0.0; 3]; 3],
-        };
+    fn take<G: Triangles>(&mut self, c: usize, geometry: &G, ids: &[u32]) {
+        // There is nothing else in a tree of triangles.
+        let corners = |&id: &u32| geometry.placed_corners(id).unwrap_or([[0.0; 3]; 3]);
         // The centre of gravity, rounded: moments are taken about what is stored.
         let (mut sum, mut total) = ([0.0; 3], 0.0);
         let [first, ..] = ids.first().map_or([[0.0; 3]; 3], corners);
@@ -219,7 +229,8 @@ impl Moments {
             |p: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| p[i] - f64::from(center[i])) };
         let reach = |t: [[f64; 3]; 3]| t.map(|p| length(about(p))).into_iter().fold(0.0, f64::max);
         let farthest = ids.iter().map(corners).map(reach).fold(0.0, f64::max);
-        let radius = ((farthest * UP) as f32).max(f32::MIN_POSITIVE);
+        let least = if G::ROUNDED { LEAST_RADIUS } else { f32::MIN_POSITIVE };
+        let radius = ((farthest * UP) as f32).max(least);
         let unit = 1.0 / f64::from(radius);
 
         let (mut area, mut third) = (0.0, 0.0);
@@ -235,6 +246,11 @@ impl Moments {
             };
             let far = v.map(length).into_iter().fold(0.0, f64::max);
             area += size;
+            if G::ROUNDED {
+                let edge = |i: usize| length([0, 1, 2].map(|a| v[i][a] - v[(i + 1) % 3][a]));
+                let moved = PLACING * unit;
+                area += SWEPT * moved * (edge(0) + edge(1) + edge(2) + 8.0 * moved);
+            }
             third += size * far * (mean(0, 0) + mean(1, 1) + mean(2, 2));
             for i in 0..3 {
                 dipole[i] += n[i];
