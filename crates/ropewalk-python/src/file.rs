@@ -97,6 +97,8 @@ pub fn open(
         degenerate: geometry.degenerate_count(),
         duplication: figures.duplication,
         tree: figures.tree,
+        cost_model: None,
+        sample_rays: 0,
         seconds: 0.0,
     };
     let preset = figures.preset.unwrap_or(Preset::Balanced);

@@ -12,8 +12,8 @@ const SEED: u64 = 0x7261_7973_616d_706c;
 /// Rays like those that a tree will be asked for, with which a build may weigh its cells
 /// ([`BuildSettings::rays`](super::BuildSettings::rays)). Copies share the rays.
 ///
-/// A ray counts from `t_min` to `t_max` and nowhere else: what is beyond a hit should not count where the
-/// query stops there, so that a sample of first hits does best with `t_max` at the hit. Of a
+/// A ray counts from `t_min` to `t_max` and nowhere else; to have it end at its hit, give that as `t_max`. On the mean
+/// of the benchmark's scenes that gains nothing (docs/lab/building.md). Of a
 /// larger sample [`RaySample::MAX`] rays are kept, drawn at random in an order that is always the same; those
 /// that can hit nothing ([`Ray::is_valid`]) are left out and counted.
 #[derive(Clone, Default, PartialEq)]
