@@ -22,6 +22,10 @@ class Report:
 
     #: Preset of the build.
     preset: str
+    #: Cost model of the build; None for a scene that was opened.
+    cost_model: str | None
+    #: Sample rays that steered the build.
+    sample_rays: int
     #: Number of meshes.
     meshes: int
     #: Number of primitives, degenerate ones included.
@@ -70,11 +74,16 @@ class Report:
             ("leaves", f"{self.leaves:,}, {self.empty_leaves:,} of them empty"),
             ("depth", str(self.max_depth)),
             ("predicted for a line", f"{self.predicted_steps:.1f} steps, {self.predicted_tests:.1f} tests"),
-            ("build", f"{self._build_time()}, preset {self.preset}"),
+            ("build", f"{self._build_time()}, preset {self.preset}{self._steered_by()}"),
         ]
 
     def _build_time(self) -> str:
         return f"{self.seconds:.3g} s" if self.seconds else "saved"
+
+    def _steered_by(self) -> str:
+        model = self.cost_model if self.cost_model not in (None, "surface_area") else None
+        rays = f"{self.sample_rays:,} rays" if self.sample_rays else None
+        return "".join(f", {part}" for part in (model, rays) if part)
 
     def __str__(self) -> str:
         rows = self._rows()

@@ -25,7 +25,7 @@ _F64 = NDArray[np.float64]
 _I32 = NDArray[np.int32]
 _I64 = NDArray[np.int64]
 _U32 = NDArray[np.uint32]
-_State = tuple[NDArray[np.uint8], NDArray[np.uint64], _F32, list[int], list[int], str]
+_State = tuple[NDArray[np.uint8], NDArray[np.uint64], _F32, list[int], list[int], tuple[str, str]]
 
 def cells_of(core: Core, points: NDArray[np.float64], threads: int) -> _I64: ...
 def walk(
@@ -58,6 +58,7 @@ class Rays:
     ) -> Rays: ...
     def __len__(self) -> int: ...
     def first_invalid(self) -> int | None: ...
+    def invalid(self) -> tuple[int, int]: ...
 
 @final
 class DoubleRays:
@@ -74,6 +75,7 @@ class DoubleRays:
     ) -> DoubleRays: ...
     def __len__(self) -> int: ...
     def first_invalid(self) -> int | None: ...
+    def invalid(self) -> tuple[int, int]: ...
 
 @final
 class DoubleCore:
@@ -83,10 +85,11 @@ class DoubleCore:
         faces: _U32,
         starts: list[int],
         masks: list[int],
-        preset: str,
+        plan: tuple[str, str],
         threads: int,
         progress: Callable[[float], object] | None = None,
         memory_limit: int | None = None,
+        rays: DoubleRays | None = None,
     ) -> DoubleCore: ...
     @staticmethod
     def place(
@@ -103,7 +106,7 @@ class DoubleCore:
     @property
     def has_shapes(self) -> bool: ...
     @property
-    def preset(self) -> str: ...
+    def plan(self) -> tuple[str, str]: ...
     @property
     def bounds(self) -> tuple[list[float], list[float]] | None: ...
     def report(self) -> dict[str, object]: ...
@@ -135,18 +138,20 @@ class Core:
         vertices: list[_F32],
         faces: list[_U32],
         masks: list[int],
-        preset: str,
+        plan: tuple[str, str],
         threads: int,
         progress: Callable[[float], object] | None = None,
         memory_limit: int | None = None,
+        rays: Rays | None = None,
     ) -> Core: ...
     @staticmethod
     def load(
         path: str,
-        preset: str,
+        plan: tuple[str, str],
         threads: int,
         progress: Callable[[float], object] | None = None,
         memory_limit: int | None = None,
+        rays: Rays | None = None,
     ) -> Core: ...
     @staticmethod
     def from_state(
@@ -155,7 +160,7 @@ class Core:
         numbers: _F32,
         starts: list[int],
         masks: list[int],
-        preset: str,
+        plan: tuple[str, str],
         threads: int,
     ) -> Core: ...
     def state(self) -> _State: ...

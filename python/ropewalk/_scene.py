@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterable
 from contextlib import contextmanager
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +55,9 @@ _PRECISION = 2.0**-20
 
 _ALL_BITS = 0xFFFF_FFFF
 
+#: Origins and directions, and where rays end.
+RaySample = tuple[ArrayLike, ArrayLike] | tuple[ArrayLike, ArrayLike, ArrayLike]
+
 #: Coordinates in float64 beyond this would overflow in products.
 _LARGEST = 1e100
 
@@ -66,6 +70,14 @@ class Scene(Saved, PointMethods):
         faces: shape (F, 3), integers from 0 to V - 1; face ``i`` is primitive ``i``.
         preset: ``"fast"``, ``"balanced"`` or ``"best"``: how long to build for how fast a tree;
             ``"compact"`` for a small one.
+        cost_model: what the build minimises: ``"surface_area"`` (MacDonald and Booth 1990), the measure of rays that
+            end where they hit, ``"termination"`` (Havran 1997, corrected), ``"termination_projection"`` or
+            ``"termination_lines"`` by how their ends are estimated, or the paper's formula as it was printed,
+            ``"havran_printed"`` or ``"havran_printed_crossed"``. All but the first take several times as long.
+        rays: a sample of the rays that the scene is for, ``(origins, directions)`` or ``(origins, directions,
+            t_max)``, shaped as in :meth:`closest_hit`. Cells that they meet more often than their surface area says
+            weigh more (Bittner and Havran 2009). A ray counts up to ``t_max`` and may be in any order; of
+            more than 65,536 so many are drawn. No answer depends on them. With ``"surface_area"`` alone.
         precision: ``"single"`` rounds vertices and rays to float32. ``"double"`` keeps them in float64, and
             answers are those of brute force in float64, at any distance from the origin, for 1.1 to 2.2
             times the time of an incoherent ray, more of a coherent one. ``"auto"`` is ``"double"`` where
@@ -81,7 +93,8 @@ class Scene(Saved, PointMethods):
     valid, and every ray misses it.
 
     Raises:
-        ArgumentError: wrong shapes, vertices that are not finite, faces that name none.
+        ArgumentError: wrong shapes, vertices that are not finite, faces that name none, unknown names, rays
+            with another cost model than the surface area.
         ArgumentTypeError: arrays that are no real numbers, faces that are no integers.
         OutOfMemoryError: the tree does not fit into memory, or into ``memory_limit``; the message says how
             much it needs.
@@ -91,6 +104,10 @@ class Scene(Saved, PointMethods):
     >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> float(scene.closest_hit([0.2, 0.2, 1.0], [0, 0, -1]).t)
     1.0
+    >>> down = [[0.1, 0.2, 1], [0.2, 0.1, 1]], [0, 0, -1]
+    >>> steered = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], rays=down)
+    >>> steered.report.sample_rays, steered.report.cost_model
+    (2, 'surface_area')
     """
 
     __slots__ = ("__weakref__", "_core", "_placed", "_points", "_report", "_starts")
@@ -103,13 +120,18 @@ class Scene(Saved, PointMethods):
         faces: ArrayLike,
         *,
         preset: str = "balanced",
+        cost_model: str = "surface_area",
+        rays: RaySample | None = None,
         precision: str = "auto",
         threads: int = 0,
         progress: bool | Callable[[float], object] | None = None,
         memory_limit: int | None = None,
     ) -> None:
         mesh = _mesh(vertices, faces, "")
-        self._adopt(_build([mesh], [_ALL_BITS], preset, precision, threads, progress, memory_limit))
+        plan = _plan(preset, cost_model)
+        self._adopt(
+            _build([mesh], [_ALL_BITS], plan, precision, threads, progress, memory_limit, rays)
+        )
 
     @classmethod
     def from_meshes(
@@ -118,6 +140,8 @@ class Scene(Saved, PointMethods):
         *,
         masks: ArrayLike | None = None,
         preset: str = "balanced",
+        cost_model: str = "surface_area",
+        rays: RaySample | None = None,
         precision: str = "auto",
         threads: int = 0,
         progress: bool | Callable[[float], object] | None = None,
@@ -161,7 +185,16 @@ class Scene(Saved, PointMethods):
         bits = [_ALL_BITS] * len(checked) if masks is None else _mesh_masks(masks, len(checked), "mesh")
         scene = cls.__new__(cls)
         scene._adopt(
-            _build(checked, bits, preset, precision, threads, progress, memory_limit)
+            _build(
+                checked,
+                bits,
+                _plan(preset, cost_model),
+                precision,
+                threads,
+                progress,
+                memory_limit,
+                rays,
+            )
         )
         return scene
 
@@ -656,12 +689,12 @@ class Scene(Saved, PointMethods):
         return self
 
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]:
-        """Pickled as its primitives; the same tree is built again."""
+        """Pickled as its primitives; the same tree is built again, without the rays of a sample."""
         core = self._core
         if self._placed is not None:
             return _restore_instances, (type(self), *self._placed, core.masks)
         if isinstance(core, DoubleCore):
-            return _restore_double, (type(self), *core.meshes(), core.starts, core.masks, core.preset)
+            return _restore_double, (type(self), *core.meshes(), core.starts, core.masks, core.plan)
         return _restore, (type(self), *core.state())
 
 
@@ -669,6 +702,8 @@ def load(
     path: str | os.PathLike[str],
     *,
     preset: str = "balanced",
+    cost_model: str = "surface_area",
+    rays: RaySample | None = None,
     precision: str = "auto",
     threads: int = 0,
     progress: bool | Callable[[float], object] | None = None,
@@ -696,6 +731,8 @@ def load(
         return Scene(
             *mesh,
             preset=preset,
+            cost_model=cost_model,
+            rays=rays,
             precision=precision,
             threads=threads,
             progress=progress,
@@ -707,8 +744,9 @@ def load(
             "precision",
         )
     with _progress(progress) as show:
-        limit = as_limit(memory_limit)
-        core = Core.load(name, _preset(preset), as_threads(threads), show, limit)
+        limit, plan = as_limit(memory_limit), _plan(preset, cost_model)
+        sample = _sample(rays, Rays, stacklevel=3)
+        core = Core.load(name, plan, as_threads(threads), show, limit, sample)
     scene = Scene.__new__(Scene)
     scene._adopt(core)
     return scene
@@ -721,11 +759,11 @@ def _restore(
     numbers: NDArray[np.float32],
     starts: list[int],
     masks: list[int],
-    preset: str,
+    plan: tuple[str, str],
 ) -> Scene:
     scene = kind.__new__(kind)
     threads = default_threads()
-    scene._adopt(Core.from_state(kinds, ends, numbers, starts, masks, preset, threads))
+    scene._adopt(Core.from_state(kinds, ends, numbers, starts, masks, plan, threads))
     return scene
 
 
@@ -741,24 +779,25 @@ def _restore_double(
     faces: NDArray[np.uint32],
     starts: list[int],
     masks: list[int],
-    preset: str,
+    plan: tuple[str, str],
 ) -> Scene:
     scene = kind.__new__(kind)
     threads = default_threads()
-    scene._adopt(DoubleCore.build(vertices, faces, starts, masks, preset, threads))
+    scene._adopt(DoubleCore.build(vertices, faces, starts, masks, plan, threads))
     return scene
 
 
 def _build(
     meshes: list[tuple[np.ndarray, np.ndarray, str]],
     masks: list[int],
-    preset: str,
+    plan: tuple[str, str],
     precision: str,
     threads: int,
     progress: bool | Callable[[float], object] | None,
     memory_limit: int | None,
+    rays: RaySample | None,
 ) -> Core | DoubleCore:
-    preset, threads, limit = _preset(preset), as_threads(threads), as_limit(memory_limit)
+    threads, limit = as_threads(threads), as_limit(memory_limit)
     if precision not in ("auto", "single", "double"):
         raise ArgumentError(
             f"precision: expected 'auto', 'single' or 'double', found {precision!r}", "precision"
@@ -768,7 +807,7 @@ def _build(
     if precision == "auto":
         precision = "double" if any(by > _PRECISION * size for by, size in moved) else "single"
     if precision == "double" and sum(len(mesh[1]) for mesh in meshes) > 0:
-        return _build_double(meshes, masks, preset, threads, progress, limit)
+        return _build_double(meshes, masks, plan, threads, progress, limit, rays)
     for (by, size), (_, corners, name) in zip(moved, meshes):
         if len(corners) and _PRECISION * size < by < np.inf:
             warnings.warn(
@@ -777,18 +816,19 @@ def _build(
                 PrecisionWarning,
                 stacklevel=4,
             )
-    faces = [mesh[1] for mesh in meshes]
+    faces, sample = [mesh[1] for mesh in meshes], _sample(rays, Rays, stacklevel=5)
     with _progress(progress) as show:
-        return Core.build(vertices, faces, masks, preset, threads, show, limit)
+        return Core.build(vertices, faces, masks, plan, threads, show, limit, sample)
 
 
 def _build_double(
     meshes: list[tuple[np.ndarray, np.ndarray, str]],
     masks: list[int],
-    preset: str,
+    plan: tuple[str, str],
     threads: int,
     progress: bool | Callable[[float], object] | None,
     limit: int | None,
+    rays: RaySample | None,
 ) -> DoubleCore:
     vertices, faces, starts, first = [], [], [0], 0
     for given, corners, name in meshes:
@@ -811,16 +851,55 @@ def _build_double(
         raise ArgumentError(f"meshes: {first} vertices are too many; expected less than 2^32", "meshes")
     one = len(meshes) == 1
     joined = (vertices[0], faces[0]) if one else (np.concatenate(vertices), np.concatenate(faces))
+    sample = _sample(rays, DoubleRays, stacklevel=6)
     with _progress(progress) as show:
-        return DoubleCore.build(*joined, starts, masks, preset, threads, show, limit)
+        return DoubleCore.build(*joined, starts, masks, plan, threads, show, limit, sample)
 
 
-def _preset(preset: str) -> str:
-    if not isinstance(preset, str):
+def _plan(preset: str, cost_model: str) -> tuple[str, str]:
+    """Names of a preset and a cost model, which the extension module knows."""
+    for name, value in (("preset", preset), ("cost_model", cost_model)):
+        if not isinstance(value, str):
+            raise ArgumentTypeError(f"{name}: expected a string, found {type(value).__name__}", name)
+    return preset, cost_model
+
+
+def _sample(rays: RaySample | None, kind: Any, stacklevel: int) -> Any:
+    """The rays of a sample."""
+    if rays is None:
+        return None
+    if not isinstance(rays, (tuple, list)) or len(rays) not in (2, 3):
+        found = f"{len(rays)} of them" if isinstance(rays, (tuple, list)) else type(rays).__name__
         raise ArgumentTypeError(
-            f"preset: expected a string, found {type(preset).__name__}", "preset"
+            f"rays: expected a tuple (origins, directions) or (origins, directions, t_max), found {found}",
+            "rays",
         )
-    return preset
+    o, d = as_points(rays[0], "rays[0]"), as_points(rays[1], "rays[1]")
+    try:
+        shape = np.broadcast_shapes(o.shape[:-1], d.shape[:-1])
+    except ValueError:
+        raise ArgumentError(
+            f"rays: expected origins and directions of shapes that fit, found {o.shape} and {d.shape}",
+            "rays",
+        ) from None
+    as_float = as_float64 if kind is DoubleRays else as_float32
+    t_max = per_ray(as_array(rays[2] if len(rays) == 3 else np.inf, "rays[2]"), shape, "rays[2]")
+    made = kind(
+        prod(shape),
+        _points(o, shape, as_float),
+        _points(d, shape, as_float),
+        as_float(np.zeros(1)),
+        as_float(t_max),
+    )
+    invalid, first = made.invalid()
+    if invalid:
+        warnings.warn(
+            f"rays: {invalid} rays have NaN or infinite numbers or no direction and are left out of the "
+            f"sample; the first is ray {first}",
+            InvalidRayWarning,
+            stacklevel=stacklevel,
+        )
+    return made
 
 
 def _cells(start: Any, shape: tuple[int, ...]) -> NDArray[np.int64] | None:

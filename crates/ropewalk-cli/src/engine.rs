@@ -3,7 +3,7 @@
 use crate::interrupt;
 use crate::output::usage;
 use anyhow::Context;
-use ropewalk::build::{self, BuildError, BuildReport, BuildSettings, Preset, Termination};
+use ropewalk::build::{self, BuildError, BuildReport, BuildSettings, Termination};
 use ropewalk::method::Method;
 use ropewalk::wide::WideTree;
 use ropewalk::{Accelerator, Geometry};
@@ -57,14 +57,6 @@ pub struct Engine {
     pub accelerator: Accelerator,
     pub report: Option<BuildReport>,
     pub build_seconds: f64,
-}
-
-/// The preset called `name`, or a usage error that lists them all.
-pub fn preset(name: &str) -> anyhow::Result<Preset> {
-    Preset::ALL.into_iter().find(|preset| preset.name() == name).ok_or_else(|| {
-        let names = Preset::ALL.map(Preset::name).join(", ");
-        usage(format!("no preset is called '{name}'; there are: {names}"))
-    })
 }
 
 /// Builds a wide tree.

@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod command;
+mod controls;
 mod engine;
 mod interrupt;
 mod output;

@@ -194,7 +194,7 @@ fn the_inputs_fault_is_exit_code_1_and_one_sentence() {
 #[test]
 fn a_wrong_use_is_exit_code_2() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [&[&str]; 13] = [
+    let cases: [&[&str]; 16] = [
         &["render"],
         &["render", "spd:tetra:2", "--method", "magic"],
         &["render", "spd:tetra:2", "--size", "0x10"],
@@ -204,6 +204,9 @@ fn a_wrong_use_is_exit_code_2() {
         &["bench"],
         &["bench", "spd:tetra:2", "--workloads", "primary,build"],
         &["bench", "spd:tetra:2", "--preset", "worst"],
+        &["bench", "spd:tetra:2", "--cost-model", "sah"],
+        &["bench", "spd:tetra:2", "--rays", "photons"],
+        &["bench", "spd:tetra:2", "--rays", "ao", "--cost-model", "termination"],
         &["bench", "spd:tetra:2", "--level", "avx1024"],
         &["bench", "spd:tetra:2", "--side", "100"],
         &["bench", "spd:tetra:2", "--rounds", "0"],

@@ -9,7 +9,7 @@ use crate::{state, work};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use ropewalk::build::{BuildSettings, Monitor, Preset};
+use ropewalk::build::{BuildSettings, CostChoice, Monitor, Preset, RaySample};
 use ropewalk::kernel::{AllHits, BatchCaster, HitFilter};
 use ropewalk::point::Cell;
 use ropewalk::primitive::{Primitive, Triangle};
@@ -94,17 +94,19 @@ type Rows<'py> = (
 impl Core {
     /// Builds a tree over meshes: vertices, faces and a mask of each.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, masks, preset, threads, progress=None, memory_limit=None))]
+    #[pyo3(signature = (vertices, faces, masks, plan, threads, progress=None, memory_limit=None, rays=None))]
     fn build(
         py: Python<'_>,
         vertices: Vec<PyReadonlyArray2<'_, f32>>,
         faces: Vec<PyReadonlyArray2<'_, u32>>,
         masks: Vec<u32>,
-        preset: &str,
+        plan: (String, String),
         threads: usize,
         progress: Option<Py<PyAny>>,
         memory_limit: Option<u64>,
+        rays: Option<&Rays>,
     ) -> PyResult<Core> {
+        let plan = Plan::new(&plan)?.with_rays(sample(py, rays)?);
         let one_mesh = vertices.len() == 1;
         let mut meshes = Vec::with_capacity(vertices.len());
         for (vertices, faces) in vertices.iter().zip(&faces) {
@@ -117,27 +119,29 @@ impl Core {
         left_for_build(memory_limit, 0, count)
             .map_err(|failure| failure.into_exception(one_mesh))?;
         let make = || triangles(&meshes);
-        Self::of(py, make, masks, preset, threads, progress, memory_limit, one_mesh)
+        Self::of(py, make, masks, plan, threads, progress, memory_limit, one_mesh)
     }
 
     /// Loads a scene file or a built-in scene, object by object as primitives of one mesh.
     #[staticmethod]
-    #[pyo3(signature = (path, preset, threads, progress=None, memory_limit=None))]
+    #[pyo3(signature = (path, plan, threads, progress=None, memory_limit=None, rays=None))]
     fn load(
         py: Python<'_>,
         path: &str,
-        preset: &str,
+        plan: (String, String),
         threads: usize,
         progress: Option<Py<PyAny>>,
         memory_limit: Option<u64>,
+        rays: Option<&Rays>,
     ) -> PyResult<Core> {
+        let plan = Plan::new(&plan)?.with_rays(sample(py, rays)?);
         let make = || {
             let scene = load_scene(path, &NffLimits::default()).map_err(Failure::File)?;
             let geometry = scene.geometry(FacetPolicy::TwoSided).map_err(Failure::Objects)?;
             let count = geometry.len() as u32;
             Ok((geometry, vec![0, count]))
         };
-        Self::of(py, make, vec![!0], preset, threads, progress, memory_limit, true)
+        Self::of(py, make, vec![!0], plan, threads, progress, memory_limit, true)
     }
 
     /// Builds what [`Core::state`] returned.
@@ -149,9 +153,10 @@ impl Core {
         numbers: PyReadonlyArray1<'_, f32>,
         starts: Vec<u32>,
         masks: Vec<u32>,
-        preset: &str,
+        plan: (String, String),
         threads: usize,
     ) -> PyResult<Core> {
+        let plan = Plan::new(&plan)?;
         let (kinds, ends, numbers) = (kinds.as_slice()?, ends.as_slice()?, numbers.as_slice()?);
         let bad = || error::argument("state", None, "the pickled scene is damaged".into());
         let sound = starts.len() == masks.len() + 1
@@ -159,7 +164,7 @@ impl Core {
             && starts.first() == Some(&0)
             && starts.last().is_some_and(|&n| n as usize == kinds.len());
         let geometry = state::read(kinds, ends, numbers).filter(|_| sound).ok_or_else(bad)?;
-        Self::of(py, || Ok((geometry, starts)), masks, preset, threads, None, None, true)
+        Self::of(py, || Ok((geometry, starts)), masks, plan, threads, None, None, true)
     }
 
     /// Everything that makes the scene, as arrays and lists.
@@ -173,12 +178,12 @@ impl Core {
         Bound<'py, PyArray1<f32>>,
         Vec<u32>,
         Vec<u32>,
-        &'static str,
+        (&'static str, &'static str),
     ) {
         let (kinds, ends, numbers) = py.detach(|| state::write(&self.geometry));
         let (kinds, ends) = (kinds.into_pyarray(py), ends.into_pyarray(py));
-        let preset = self.preset.name();
-        (kinds, ends, numbers.into_pyarray(py), self.starts.clone(), self.masks.clone(), preset)
+        let plan = plan_of(self.preset, &self.report);
+        (kinds, ends, numbers.into_pyarray(py), self.starts.clone(), self.masks.clone(), plan)
     }
 
     /// The first primitive of each mesh, and the number of primitives.
@@ -453,16 +458,13 @@ impl Core {
         py: Python<'_>,
         make: impl FnOnce() -> Result<Parts, Failure> + Send,
         masks: Vec<u32>,
-        preset: &str,
+        plan: Plan,
         threads: usize,
         progress: Option<Py<PyAny>>,
         memory_limit: Option<u64>,
         one_mesh: bool,
     ) -> PyResult<Core> {
-        let preset = self::preset(preset)?;
-        // Work with 0 threads runs in the current pool, which is the one that `watch` chose.
-        let settings =
-            BuildSettings { threads: usize::from(threads == 1), ..BuildSettings::preset(preset) };
+        let settings = plan.settings(threads);
         let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
         let show = |py: Python<'_>| match &progress {
             Some(progress) => {
@@ -484,7 +486,8 @@ impl Core {
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        Ok(Core { geometry, tree, report: Build::from(&report), starts, masks, preset })
+        let (report, preset) = (Build::from(&report), plan.preset);
+        Ok(Core { geometry, tree, report, starts, masks, preset })
     }
 
     /// The geometry.
@@ -575,13 +578,61 @@ impl HitFilter for RayFilter<'_> {
     }
 }
 
-/// The preset of a name.
-pub fn preset(name: &str) -> PyResult<Preset> {
-    Preset::ALL.into_iter().find(|preset| preset.name() == name).ok_or_else(|| {
-        let names = Preset::ALL.map(Preset::name).join(", ");
-        let message = format!("preset is '{name}'; expected one of {names}");
-        error::argument("preset", None, message)
-    })
+/// How to build.
+pub struct Plan {
+    /// The preset.
+    pub preset: Preset,
+    cost_model: CostChoice,
+    rays: RaySample,
+}
+
+impl Plan {
+    /// From the names of a preset and of a cost model.
+    pub fn new((preset, cost_model): &(String, String)) -> PyResult<Plan> {
+        let known = Preset::ALL.into_iter().find(|known| known.name() == preset);
+        let preset = known.ok_or_else(|| {
+            let names = Preset::ALL.map(Preset::name).join(", ");
+            let message = format!("preset is '{preset}'; expected one of {names}");
+            error::argument("preset", None, message)
+        })?;
+        let cost_model = CostChoice::by_name(cost_model).ok_or_else(|| {
+            let names = CostChoice::ALL.map(CostChoice::name).join(", ");
+            let message = format!("cost_model is '{cost_model}'; expected one of {names}");
+            error::argument("cost_model", None, message)
+        })?;
+        Ok(Plan { preset, cost_model, rays: RaySample::default() })
+    }
+
+    /// With a sample of rays.
+    pub fn with_rays(self, rays: RaySample) -> Plan {
+        Plan { rays, ..self }
+    }
+
+    /// The settings; work with 0 threads runs in the current pool, which is the one that `watch` chose.
+    pub fn settings(&self, threads: usize) -> BuildSettings {
+        self.cost_model.applied(BuildSettings {
+            threads: usize::from(threads == 1),
+            rays: self.rays.clone(),
+            ..BuildSettings::preset(self.preset)
+        })
+    }
+}
+
+/// The names of a preset and of a build's cost model, that of the presets where it is not known.
+pub fn plan_of(preset: Preset, report: &Build) -> (&'static str, &'static str) {
+    (preset.name(), report.cost_model.unwrap_or_default().name())
+}
+
+/// The sample that some rays are.
+fn sample(py: Python<'_>, rays: Option<&Rays>) -> PyResult<RaySample> {
+    let Some(rays) = rays else { return Ok(RaySample::default()) };
+    let arrays = rays.borrow(py)?;
+    let view = arrays.view()?;
+    Ok(py.detach(|| {
+        let mut rays = Vec::with_capacity(view.count);
+        view.interleave(0..view.count, &mut rays);
+        RaySample::new(&rays)
+    }))
 }
 
 /// Figures of a build, those of its bytes left to the caller.
@@ -593,6 +644,8 @@ pub fn figures<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let (figures, stats) = (PyDict::new(py), &report.tree);
     figures.set_item("preset", preset.name())?;
+    figures.set_item("cost_model", report.cost_model.map(CostChoice::name))?;
+    figures.set_item("sample_rays", report.sample_rays)?;
     figures.set_item("meshes", meshes)?;
     figures.set_item("primitives", report.primitives)?;
     figures.set_item("degenerate", report.degenerate)?;

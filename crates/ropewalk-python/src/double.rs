@@ -1,7 +1,7 @@
 //! Scenes in `f64`, of meshes or of instances, and the batch queries: what [`Core`](crate::core::Core) is in
 //! `f32`.
 
-use crate::core::{Watch, blocks, checked, left_for_build, split, total, zeros};
+use crate::core::{Plan, Watch, blocks, checked, left_for_build, plan_of, split, total, zeros};
 use crate::error::{self, Failure};
 use crate::figures::Build;
 use crate::rays::{Arrays, Invalid, View, one};
@@ -11,7 +11,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, P
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use ropewalk::Sides;
-use ropewalk::build::{BuildSettings, Preset};
+use ropewalk::build::{BuildSettings, CostChoice, Preset, RaySample};
 use ropewalk::double::{
     DoubleAllHits, DoubleCaster, DoubleFilter, DoubleGeometry, DoubleHit, DoubleRay,
 };
@@ -60,6 +60,14 @@ impl DoubleRays {
         let arrays = self.0.borrow(py)?;
         let view = arrays.view()?;
         Ok(py.detach(|| (0..view.count).find(|&i| !ray_of(&view, i).is_valid())))
+    }
+
+    /// How many rays hit nothing whatever the scene, their ranges aside, and the first of them.
+    fn invalid(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
+        let arrays = self.0.borrow(py)?;
+        let view = arrays.view()?;
+        let invalid = py.detach(|| rays_of(&view, 0..view.count).1);
+        Ok((invalid.count, invalid.first))
     }
 }
 
@@ -128,19 +136,22 @@ impl DoubleCore {
     /// Builds a tree over the vertices and faces of all meshes one after another; `starts` are the first
     /// face of each mesh and the number of faces.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, starts, masks, preset, threads, progress=None, memory_limit=None))]
+    #[pyo3(signature = (vertices, faces, starts, masks, plan, threads, progress=None, memory_limit=None, rays=None))]
     fn build(
         py: Python<'_>,
         vertices: PyReadonlyArray2<'_, f64>,
         faces: PyReadonlyArray2<'_, u32>,
         starts: Vec<u32>,
         masks: Vec<u32>,
-        preset: &str,
+        plan: (String, String),
         threads: usize,
         progress: Option<Py<PyAny>>,
         memory_limit: Option<u64>,
+        rays: Option<&DoubleRays>,
     ) -> PyResult<DoubleCore> {
-        let preset = crate::core::preset(preset)?;
+        let plan = Plan::new(&plan)?;
+        let arrays = rays.map(|rays| rays.0.borrow(py)).transpose()?;
+        let view = arrays.as_ref().map(|arrays| arrays.view()).transpose()?;
         let sound = starts.len() == masks.len() + 1 && starts.is_sorted();
         let count = faces.as_slice()?.len() / 3;
         if !sound || starts.first() != Some(&0) || starts.last().map(|&n| n as usize) != Some(count)
@@ -149,8 +160,7 @@ impl DoubleCore {
         }
         let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
         let (faces, _) = faces.as_slice()?.as_chunks::<3>();
-        let settings =
-            BuildSettings { threads: usize::from(threads == 1), ..BuildSettings::preset(preset) };
+        let (settings, preset) = (plan.settings(threads), plan.preset);
         let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
         let show = |py: Python<'_>| match &progress {
             Some(progress) => {
@@ -165,6 +175,10 @@ impl DoubleCore {
             let settings = BuildSettings { memory_limit, ..settings.clone() };
             let geometry = DoubleGeometry::from_triangles(vertices.to_vec(), faces.to_vec())
                 .map_err(Failure::Double)?;
+            let rays = view.map_or_else(RaySample::default, |view| {
+                geometry.ray_sample(&rays_of(&view, 0..view.count).0)
+            });
+            let settings = BuildSettings { rays, ..settings };
             let watch = Watch { stop: &stop, done: &done };
             Object::build(geometry, &settings, &watch).map_err(Failure::Build)
         };
@@ -252,10 +266,13 @@ impl DoubleCore {
         false
     }
 
-    /// Name of the preset.
+    /// Names of the preset and of the cost model.
     #[getter]
-    fn preset(&self) -> &'static str {
-        self.preset.name()
+    fn plan(&self) -> (&'static str, &'static str) {
+        match &self.held {
+            Held::Meshes(_, report) => plan_of(self.preset, report),
+            Held::Instances(_) => (self.preset.name(), CostChoice::default().name()),
+        }
     }
 
     /// Lower and upper corner of the box of everything.

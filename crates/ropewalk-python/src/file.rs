@@ -142,7 +142,9 @@ pub fn open(
 /// Preset and figures of a saved scene.
 fn built(figures: Option<Figures>, primitives: usize, degenerate: usize) -> (Preset, Build) {
     let Figures { preset, duplication, tree } = figures.unwrap_or_default();
-    let report = Build { primitives, degenerate, duplication, tree, seconds: 0.0 };
+    let (cost_model, sample_rays) = (None, 0);
+    let report =
+        Build { primitives, degenerate, duplication, tree, cost_model, sample_rays, seconds: 0.0 };
     (preset.unwrap_or(Preset::Balanced), report)
 }
 

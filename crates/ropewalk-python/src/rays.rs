@@ -53,6 +53,14 @@ impl Rays {
         let view = arrays.view()?;
         Ok(py.detach(|| (0..view.count).find(|&i| !view.ray(i).is_valid())))
     }
+
+    /// How many rays hit nothing whatever the scene, their ranges aside, and the first of them.
+    fn invalid(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
+        let arrays = self.0.borrow(py)?;
+        let view = arrays.view()?;
+        let invalid = py.detach(|| view.interleave(0..view.count, &mut Vec::new()));
+        Ok((invalid.count, invalid.first))
+    }
 }
 
 impl Rays {

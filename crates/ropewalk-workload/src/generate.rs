@@ -47,6 +47,7 @@ pub struct Generator<'a> {
     ground: &'a dyn Surface,
     view: &'a View,
     sizes: Sizes,
+    seed: u64,
     trace: &'a dyn Fn(&[Ray], &mut [BenchHit]),
     surface: OnceCell<Vec<SurfacePoint>>,
 }
@@ -66,7 +67,17 @@ impl<'a> Generator<'a> {
         sizes: Sizes,
         trace: &'a dyn Fn(&[Ray], &mut [BenchHit]),
     ) -> Self {
-        Generator { ground, view, sizes, trace, surface: OnceCell::new() }
+        Generator { ground, view, sizes, seed: 0, trace, surface: OnceCell::new() }
+    }
+
+    /// Other random numbers than those of seed 0, which the benchmark has. Primary rays, shadow rays and the
+    /// points that the others start from depend on the size of the picture alone.
+    pub fn with_seed(self, seed: u64) -> Self {
+        Generator { seed, ..self }
+    }
+
+    fn random(&self, stream: u64) -> Random {
+        Random::new(stream ^ self.seed << 32)
     }
 
     /// The rays of a workload. [`Kind::Build`] has none; workloads that start on surfaces have
@@ -81,7 +92,8 @@ impl<'a> Generator<'a> {
             Kind::AllHits | Kind::FirstHits => self.chords(),
             Kind::Walk1 | Kind::Walk02 => {
                 let mean = if kind == Kind::Walk1 { 0.01 } else { 0.002 };
-                let walk = walk::segments(self.ground, mean, self.sizes.walk, self.trace);
+                let walk =
+                    walk::segments(self.ground, mean, self.sizes.walk, self.seed, self.trace);
                 chains = walk.1;
                 walk.0
             }
@@ -145,7 +157,7 @@ impl<'a> Generator<'a> {
     }
 
     fn diffuse(&self) -> Vec<Ray> {
-        let (points, mut random) = (self.surface(), Random::new(2));
+        let (points, mut random) = (self.surface(), self.random(2));
         if points.is_empty() {
             return Vec::new();
         }
@@ -170,13 +182,13 @@ impl<'a> Generator<'a> {
     }
 
     fn ambient_occlusion(&self) -> Vec<Ray> {
-        let (length, mut random) = (AO_LENGTH * self.ground.bounds().diagonal(), Random::new(4));
+        let (length, mut random) = (AO_LENGTH * self.ground.bounds().diagonal(), self.random(4));
         let cast = |p: &SurfacePoint| ray(p.at, cosine_weighted(p.normal, &mut random), length);
         self.surface().iter().map(cast).collect()
     }
 
     fn chords(&self) -> Vec<Ray> {
-        let (bounds, mut random) = (self.ground.bounds(), Random::new(5));
+        let (bounds, mut random) = (self.ground.bounds(), self.random(5));
         let radius = bounds.diagonal() / 2.0;
         let center: [f64; 3] =
             std::array::from_fn(|a| (f64::from(bounds.min[a]) + f64::from(bounds.max[a])) / 2.0);

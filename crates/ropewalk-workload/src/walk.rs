@@ -24,6 +24,7 @@ pub(super) fn segments(
     ground: &dyn Surface,
     mean: f64,
     count: usize,
+    seed: u64,
     trace: &dyn Fn(&[Ray], &mut [BenchHit]),
 ) -> (Vec<Ray>, Vec<u32>) {
     let bounds = ground.bounds();
@@ -31,7 +32,7 @@ pub(super) fn segments(
     let walkers = count / Sizes::SEGMENTS;
     let mut crowd: Vec<Walker> = (0..walkers)
         .map(|i| {
-            let mut random = Random::new(1_000_003 + i as u64);
+            let mut random = Random::new((1_000_003 + i as u64) ^ seed << 32);
             Walker { at: anywhere(&bounds, &mut random), surface: None, random, fresh: true }
         })
         .collect();

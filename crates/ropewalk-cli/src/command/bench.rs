@@ -1,13 +1,14 @@
 //! `ropewalk bench SCENE`
 
+use crate::controls::{Controls, named, workloads};
 use crate::output::{print_json, thousands, usage};
 use crate::paper::statistics::median;
 use crate::{engine, interrupt, saved};
-use ropewalk::build::{BuildSettings, Preset};
+use ropewalk::build::CostChoice;
 use ropewalk::kernel::{BatchCaster, BatchEvents, BatchReport, Level};
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray};
-use ropewalk_workload::{BenchHit, FIRST_HITS, Generator, Kind, Question, Sizes, View, Workload};
+use ropewalk_workload::{BenchHit, FIRST_HITS, Generator, Question, Sizes, View, Workload};
 use serde::Serialize;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -25,9 +26,8 @@ pub struct Args {
         default_value = "primary,diffuse,shadow,ao,all-hits,walk-1%"
     )]
     workloads: Vec<String>,
-    /// How to build: fast, balanced, best or compact; balanced if not given. A saved scene is not built
-    #[arg(long)]
-    preset: Option<String>,
+    #[command(flatten)]
+    controls: Controls,
     /// Pixels along a side of the picture, a power of two; the other workloads follow its size
     #[arg(long, default_value_t = 512, value_parser = side)]
     side: usize,
@@ -59,6 +59,9 @@ fn side(text: &str) -> Result<usize, String> {
 struct Output {
     scene: String,
     preset: &'static str,
+    /// Not known of a saved scene.
+    cost_model: Option<&'static str>,
+    sample_rays: usize,
     level: &'static str,
     threads: usize,
     rounds: u32,
@@ -122,6 +125,8 @@ impl PerRay {
 struct Subject {
     name: String,
     preset: &'static str,
+    cost_model: Option<&'static str>,
+    sample_rays: usize,
     tree: WideTree,
     geometry: Arc<Geometry>,
     view: View,
@@ -130,15 +135,17 @@ struct Subject {
 
 impl Subject {
     fn build(args: &Args) -> anyhow::Result<Subject> {
-        let preset = args.preset.as_deref().unwrap_or(Preset::Balanced.name());
-        let preset = engine::preset(preset)?;
+        let (preset, model) = args.controls.names()?;
         let loaded = engine::load(&args.scene)?;
-        let settings = BuildSettings { threads: args.threads, ..BuildSettings::preset(preset) };
+        // Another picture than the one that is measured, so that no ray is in both.
+        let settings = args.controls.settings(&loaded, (args.side / 2).max(1), args.threads)?;
         let (tree, report) = engine::build_wide(&loaded.geometry, &settings)?;
         let view = saved::view_of(&loaded);
         Ok(Subject {
             name: loaded.scene.name,
             preset: preset.name(),
+            cost_model: Some(model.name()),
+            sample_rays: settings.rays.len(),
             tree,
             geometry: loaded.geometry,
             view,
@@ -147,8 +154,8 @@ impl Subject {
     }
 
     fn open(args: &Args) -> anyhow::Result<Subject> {
-        if args.preset.is_some() {
-            return Err(usage("a saved scene is not built; leave --preset out"));
+        if let Some(option) = args.controls.given() {
+            return Err(usage(format!("a saved scene is not built; leave {option} out")));
         }
         let start = Instant::now();
         let scene = saved::open(&args.scene, false)?;
@@ -158,6 +165,8 @@ impl Subject {
         Ok(Subject {
             name: args.scene.clone(),
             preset: preset.unwrap_or("saved"),
+            cost_model: None,
+            sample_rays: 0,
             tree: scene.tree,
             geometry: Arc::new(scene.geometry),
             view,
@@ -168,7 +177,7 @@ impl Subject {
 
 /// Builds or opens, casts and prints.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let kinds = kinds(&args.workloads)?;
+    let kinds = workloads(&args.workloads)?;
     let level = level(args.level.as_deref())?;
     let subject =
         if saved::is_saved(&args.scene) { Subject::open(args)? } else { Subject::build(args)? };
@@ -196,6 +205,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let output = Output {
         scene: subject.name.clone(),
         preset: subject.preset,
+        cost_model: subject.cost_model,
+        sample_rays: subject.sample_rays,
         level: level.name(),
         threads: pool.current_num_threads(),
         rounds: args.rounds,
@@ -206,25 +217,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         workloads,
     };
     if args.json { print_json(&output) } else { print_text(&output) }
-}
-
-/// The workloads of these names; all but the one without rays are known.
-fn kinds(names: &[String]) -> anyhow::Result<Vec<Kind>> {
-    let known: Vec<Kind> = Kind::ALL.into_iter().filter(|&k| k != Kind::Build).collect();
-    names.iter().map(|name| named(&known, Kind::name, name, "workload")).collect()
-}
-
-/// The value called `name`, or a usage error that lists them all.
-fn named<T: Copy>(
-    all: &[T],
-    name_of: fn(T) -> &'static str,
-    name: &str,
-    what: &str,
-) -> anyhow::Result<T> {
-    all.iter().copied().find(|&x| name_of(x) == name).ok_or_else(|| {
-        let names: Vec<_> = all.iter().map(|&x| name_of(x)).collect();
-        usage(format!("no {what} is called '{name}'; there are: {}", names.join(", ")))
-    })
 }
 
 /// The level of this name, if the machine has it; its best one without a name.
@@ -279,7 +271,14 @@ fn measure(
 }
 
 fn print_text(o: &Output) -> anyhow::Result<()> {
-    println!("{}, {}, {}, {} thread(s)", o.scene, o.preset, o.level, o.threads);
+    let model = o.cost_model.filter(|&model| model != CostChoice::default().name());
+    let model = model.map_or(String::new(), |model| format!(", {model}"));
+    let rays = match o.sample_rays {
+        0 => String::new(),
+        n => format!(", steered by {} rays", thousands(n as u64)),
+    };
+    let Output { scene, preset, level, threads, .. } = o;
+    println!("{scene}, {preset}{model}{rays}, {level}, {threads} thread(s)");
     println!(
         "  {} primitives, {:.0} bytes each; seconds: read {:.2}, build {:.2}",
         thousands(o.primitives as u64),

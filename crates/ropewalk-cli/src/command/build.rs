@@ -1,8 +1,8 @@
 //! `ropewalk build SCENE --save FILE`
 
+use crate::controls::Controls;
 use crate::output::{print_json, thousands};
 use crate::{engine, saved};
-use ropewalk::build::{BuildSettings, Preset};
 use ropewalk::file::{Contents, Figures};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,9 +16,8 @@ pub struct Args {
     /// The file to save to, written whole or not at all; .rope is usual
     #[arg(long, value_name = "FILE")]
     save: PathBuf,
-    /// How to build: fast, balanced, best or compact
-    #[arg(long, default_value = Preset::Balanced.name())]
-    preset: String,
+    #[command(flatten)]
+    controls: Controls,
     /// Threads; 0 is one per core. The file is the same for any number
     #[arg(long, default_value_t = 0)]
     threads: usize,
@@ -27,10 +26,15 @@ pub struct Args {
     json: bool,
 }
 
+/// Pixels along a side of the picture from which sample rays are drawn.
+const SAMPLE_SIDE: usize = 256;
+
 #[derive(Serialize)]
 struct Output {
     scene: String,
     preset: &'static str,
+    cost_model: &'static str,
+    sample_rays: usize,
     primitives: usize,
     tree_bytes: usize,
     file_bytes: u64,
@@ -46,9 +50,9 @@ struct Seconds {
 
 /// Builds and saves.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let preset = engine::preset(&args.preset)?;
+    let (preset, model) = args.controls.names()?;
     let loaded = engine::load(&args.scene)?;
-    let settings = BuildSettings { threads: args.threads, ..BuildSettings::preset(preset) };
+    let settings = args.controls.settings(&loaded, SAMPLE_SIDE, args.threads)?;
     let (tree, report) = engine::build_wide(&loaded.geometry, &settings)?;
     let figures = Figures::new(&report, Some(preset));
     let extra = [saved::view_section(&saved::view_of(&loaded))];
@@ -62,6 +66,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let output = Output {
         scene: loaded.scene.name.clone(),
         preset: preset.name(),
+        cost_model: model.name(),
+        sample_rays: settings.rays.len(),
         primitives: loaded.geometry.len(),
         tree_bytes: tree.bytes(),
         file_bytes: written.bytes,

@@ -6,6 +6,7 @@
 
 mod arena;
 mod blockage;
+mod choice;
 mod error;
 mod event;
 mod fragment;
@@ -13,17 +14,21 @@ mod late_cutting;
 pub(crate) mod memory;
 mod monitor;
 mod plane;
+mod rays;
 mod report;
+mod sample;
 mod search;
 mod settings;
 mod stopping;
 mod subtree;
 
 pub use blockage::EstimatorStats;
+pub use choice::CostChoice;
 pub use error::BuildError;
 pub use memory::estimated_bytes;
 pub use monitor::Monitor;
 pub use report::{BuildReport, StopCounts};
+pub use sample::RaySample;
 pub use settings::{BuildSettings, Measure, Preset, Termination, TerminationEstimator};
 
 use crate::aabb::Aabb;
@@ -185,6 +190,7 @@ fn build_output(
     let context = Context {
         search: search.as_ref(),
         clipper: Clipper { geometry, clipping: settings.clipping, margin: settings.margin },
+        sample: &settings.rays,
         pricing,
         stopping: Stopping::new(settings.termination, fragments.len()),
         late_cutting: settings.late_cutting,

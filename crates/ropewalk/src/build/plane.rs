@@ -159,6 +159,13 @@ pub(crate) struct Pricing {
 }
 
 impl Pricing {
+    /// The same in a node that rays meet so much more often than its surface area says: what it grows by is paid
+    /// for by more rays.
+    #[inline]
+    pub fn where_crowded(&self, crowding: f64) -> Self {
+        Pricing { size_unit: self.size_unit / crowding, ..*self }
+    }
+
     /// Price of one more unit of leaf cost in the children than in the node, to a ray that hits it.
     #[inline]
     pub fn size_price(&self, areas: &CellAreas) -> f64 {
@@ -174,10 +181,23 @@ impl Pricing {
         areas: &CellAreas,
         position: f32,
         total: usize,
+        children: (usize, usize),
+        ends: (f64, f64),
+    ) -> f64 {
+        self.price_parts(model, areas, areas.parts(position), total, children, ends)
+    }
+
+    /// The same with the areas of the children given.
+    #[inline]
+    pub fn price_parts<M: CostModel>(
+        &self,
+        model: &M,
+        areas: &CellAreas,
+        (area_left, area_right): (f64, f64),
+        total: usize,
         (left, right): (usize, usize),
         (ends_left, ends_right): (f64, f64),
     ) -> f64 {
-        let (area_left, area_right) = areas.parts(position);
         let (cost_left, cost_right) = (self.leaf_cost.cost(left), self.leaf_cost.cost(right));
         let measure = model.cost(&Cut {
             area: areas.area,

@@ -1,6 +1,7 @@
 //! One documented struct of settings, with presets.
 
 use super::error::BuildError;
+use super::sample::RaySample;
 use crate::cost::{self, CostModel, LeafCost};
 use crate::tree::MAX_DEPTH;
 
@@ -133,6 +134,10 @@ impl Preset {
     }
 }
 
+/// The largest `binned_from` of a build with sample rays, which the exact sweep does not know: nodes with fewer
+/// references try all positions.
+const BINNED_WITH_RAYS: usize = 33;
+
 /// Everything that steers a build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildSettings {
@@ -168,6 +173,10 @@ pub struct BuildSettings {
     /// Kapustin 2007) instead of sweeping over all of them; `usize::MAX` is the exact sweep
     /// everywhere. Read by [`Measure::MacDonaldBooth`] alone.
     pub binned_from: usize,
+    /// Rays like those that the tree will be asked for: cells that they meet more often than their surface area says
+    /// weigh more. Without any the surface area alone decides. Read by [`Measure::MacDonaldBooth`] alone, whose nodes
+    /// then all look for their planes in bins or, where they are small, among all positions.
+    pub rays: RaySample,
     /// Width by which all primitives are thickened on every side, so that cells also refer to those that
     /// pass by them so closely: for geometry that has been rounded. 0 is off.
     pub margin: f32,
@@ -195,6 +204,7 @@ impl Default for BuildSettings {
             clipping: true,
             max_duplication: 32.0,
             binned_from: usize::MAX,
+            rays: RaySample::default(),
             margin: 0.0,
             memory_limit: None,
             threads: 0,
@@ -225,7 +235,7 @@ impl BuildSettings {
         }
     }
 
-    /// The settings in effect, checked: the 1990 measure never clips.
+    /// The settings in effect, checked: the 1990 measure never clips, and sample rays are looked at in bins.
     ///
     /// # Errors
     /// [`BuildError::Setting`] that names the first field out of range.
@@ -278,7 +288,14 @@ impl BuildSettings {
             _ => {}
         }
         let clipping = self.clipping && self.measure != Measure::MacDonaldBooth1990;
-        Ok(BuildSettings { clipping, ..self.clone() })
+        let mut binned_from = self.binned_from;
+        if !self.rays.is_empty() {
+            let found = format!("a sample of {} with {:?}", self.rays.len(), self.measure);
+            let expected = "no rays but with the surface area, Measure::MacDonaldBooth";
+            check(self.measure == Measure::MacDonaldBooth, "rays", found, expected)?;
+            binned_from = binned_from.min(BINNED_WITH_RAYS);
+        }
+        Ok(BuildSettings { clipping, binned_from, ..self.clone() })
     }
 
     fn check_depth(max_depth: Option<u32>) -> Result<(), BuildError> {

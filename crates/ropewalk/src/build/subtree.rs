@@ -5,8 +5,10 @@ use super::error::BuildError;
 use super::fragment::Fragment;
 use super::late_cutting;
 use super::monitor::Monitor;
-use super::plane::{Plane, Pricing};
+use super::plane::{CellAreas, Plane, Pricing};
+use super::rays::RayStack;
 use super::report::StopCounts;
+use super::sample::RaySample;
 use super::search::{NodeView, PlaneSearch, SearchBuffers};
 use super::stopping::{StopReason, Stopping};
 use crate::aabb::Aabb;
@@ -22,10 +24,15 @@ const PROGRESS_GRAIN: f64 = 1.0 / 256.0;
 /// Nodes with fewer fragments do not ask whether the build was cancelled.
 const CANCEL_GRAIN: usize = 256;
 
+/// Largest factor by which a node is thought likelier, or less likely, than by its area: a bound for the product
+/// down a path, far from what rounding could disturb.
+const MAX_CROWDING: f64 = 1e9;
+
 /// What all workers share.
 pub(super) struct Context<'a> {
     pub search: &'a dyn PlaneSearch,
     pub clipper: Clipper<'a>,
+    pub sample: &'a RaySample,
     pub pricing: Pricing,
     pub stopping: Stopping,
     pub late_cutting: bool,
@@ -44,8 +51,10 @@ impl Context<'_> {
         budget: u64,
     ) -> Result<Output, BuildError> {
         let (arena, size) = Arena::new(fragments, self.search.uses_events(), self.parallel);
-        let mut worker = Worker::new(self, arena);
-        worker.node(Task { cell, size, depth: 0, failures: 0, budget, share: 1.0 })?;
+        let (stack, rays) = RayStack::new(self.sample, &cell, size.fragments);
+        let mut worker = Worker::new(self, arena, stack);
+        let (share, crowding) = (1.0, 1.0);
+        worker.node(Task { cell, size, rays, crowding, depth: 0, failures: 0, budget, share })?;
         Ok(worker.out)
     }
 
@@ -98,10 +107,13 @@ fn check_index(index: usize, what: &'static str) -> Result<u32, BuildError> {
     u32::try_from(index).ok().filter(|&i| i <= max).ok_or(BuildError::TooLarge { what, max })
 }
 
-/// A node to be built; its fragments are on top of the worker's arena.
+/// A node to be built; its fragments are on top of the worker's arena, its rays on top of the stack.
 struct Task {
     cell: Aabb,
     size: NodeSize,
+    rays: usize,
+    /// See [`NodeView::crowding`].
+    crowding: f64,
     depth: usize,
     /// Failed splits on the path.
     failures: u32,
@@ -115,16 +127,18 @@ struct Task {
 struct Worker<'a> {
     context: &'a Context<'a>,
     arena: Arena,
+    rays: RayStack,
     out: Output,
     split_buffers: SplitBuffers,
     search_buffers: SearchBuffers,
 }
 
 impl<'a> Worker<'a> {
-    fn new(context: &'a Context<'a>, arena: Arena) -> Self {
+    fn new(context: &'a Context<'a>, arena: Arena, rays: RayStack) -> Self {
         Worker {
             context,
             arena,
+            rays,
             out: Output::default(),
             split_buffers: SplitBuffers::default(),
             search_buffers: SearchBuffers::default(),
@@ -169,6 +183,8 @@ impl<'a> Worker<'a> {
             depth: task.depth,
             fragments: self.arena.fragments(&task.size),
             events: self.arena.events(&task.size),
+            rays: self.rays.top(task.rays),
+            crowding: task.crowding,
         };
         let plane =
             search.best_plane(&view, &mut self.search_buffers).ok_or(StopReason::NoPlane)?;
@@ -192,10 +208,16 @@ impl<'a> Worker<'a> {
             self.context.clipper,
             &mut self.split_buffers,
         );
-        let [left, right] = task.children(cells, left_size, right_size);
+        let crowding = self.crowding(&task, plane);
+        let sizes = (left_size.fragments, right_size.fragments);
+        let rays = self.rays.split(task.rays, plane, &cells, self.context.sample, sizes);
+        let [mut left, mut right] = task.children(cells, left_size, right_size);
+        (left.rays, right.rays) = rays;
+        (left.crowding, right.crowding) = crowding;
         if self.context.parallel && task.size.fragments >= PARALLEL_GRAIN {
             let arena = self.arena.take_below(&left_size, &right_size);
-            let mut other = Worker::new(self.context, arena);
+            let stack = self.rays.take_below(rays.0, rays.1);
+            let mut other = Worker::new(self.context, arena, stack);
             let (a, b) = rayon::join(|| self.node(left), || other.node(right));
             a.and(b)?;
             let right_index = self.out.next_node()?;
@@ -207,6 +229,24 @@ impl<'a> Worker<'a> {
             self.out.nodes[index] = Node::inner(plane.axis, plane.position, right_index);
             self.node(right)
         }
+    }
+
+    /// The crowding of both children of the node on top.
+    fn crowding(&self, task: &Task, plane: &Plane) -> (f64, f64) {
+        let of_node = task.crowding;
+        let (Some(rays), Some(areas)) =
+            (self.rays.top(task.rays), CellAreas::new(&task.cell, plane.axis))
+        else {
+            return (of_node, of_node);
+        };
+        let (left, right) = areas.parts(plane.position);
+        let (mixed_left, mixed_right) = rays.areas(&areas, plane.axis, plane.position);
+        // A part without area is met by no ray at all, so that any number will do.
+        let of = |mixed: f64, area: f64| {
+            let crowding = if area > 0.0 { of_node * mixed / area } else { of_node };
+            crowding.clamp(MAX_CROWDING.recip(), MAX_CROWDING)
+        };
+        (of(mixed_left, left), of(mixed_right, right))
     }
 
     /// Emits the node on top as a leaf, with empty slabs cut off if that is wanted and pays.
@@ -236,6 +276,7 @@ impl<'a> Worker<'a> {
         }
         self.out.stops.late_cuts += slabs.len() as u64;
         self.arena.pop(&task.size);
+        self.rays.pop(task.rays);
         Ok(())
     }
 }
@@ -252,6 +293,8 @@ impl Task {
         let child = |cell, size, budget, share| Task {
             cell,
             size,
+            rays: 0,
+            crowding: self.crowding,
             depth: self.depth + 1,
             failures: self.failures,
             budget,

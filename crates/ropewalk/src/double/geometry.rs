@@ -2,7 +2,7 @@
 
 use super::narrow::{Frame, MARGIN, Narrowed};
 use super::{DoubleHit, DoubleRay, Rows};
-use crate::build::{BuildError, BuildReport, BuildSettings, Monitor};
+use crate::build::{BuildError, BuildReport, BuildSettings, Monitor, RaySample};
 use crate::geometry::{Geometry, GeometryError};
 use crate::point::expansion::Expansion;
 use crate::primitive::{Sides, Triangle};
@@ -141,6 +141,16 @@ impl DoubleGeometry {
         let rounded = self.rounded();
         let (wide, report) = WideTree::build_without(&left_out, &rounded, &settings, monitor)?;
         Ok((DoubleTree { wide }, BuildReport { degenerate: self.degenerate_count(), ..report }))
+    }
+
+    /// A sample of rays for [`DoubleGeometry::build`], in the numbers of the search. Those that start or end
+    /// beyond their reach are left out too.
+    pub fn ray_sample(&self, rays: &[DoubleRay]) -> RaySample {
+        let narrowed = rays.iter().filter_map(|ray| match self.frame.ray(ray) {
+            Narrowed::Ray(ray, _) => Some(ray),
+            Narrowed::Misses | Narrowed::Beyond => None,
+        });
+        RaySample::of(rays.len(), narrowed)
     }
 
     /// Number of triangles, degenerate ones included.

@@ -40,7 +40,7 @@ impl WideTree {
         let mut settings = settings.effective()?;
         if let Some(limit) = settings.memory_limit {
             settings.max_duplication =
-                build::memory::duplication_within(limit, geometry.len(), settings.max_duplication)?;
+                build::memory::duplication_within(limit, geometry.len(), &settings)?;
         }
         build::in_pool(settings.threads, || {
             let (tree, mut report) = build::build_here(geometry, &settings, monitor)?;

@@ -3,7 +3,7 @@
 use crate::bench::{Bench, coordinates};
 use crate::scenes;
 use ropewalk::Geometry;
-use ropewalk::build::{BuildSettings, Measure, Preset, Termination, build};
+use ropewalk::build::{BuildSettings, Measure, Preset, RaySample, Termination, build};
 use ropewalk_testkit::rays::{Draw, aligned_ray, generic_ray, grid_ray};
 use std::sync::Arc;
 
@@ -71,7 +71,10 @@ fn binned_planes_and_presets() {
             check(&settings, geometry.clone(), draw);
             let preset = Preset::ALL[draw.below(Preset::ALL.len())];
             let settings = BuildSettings { threads: 1, ..BuildSettings::preset(preset) };
-            check(&settings, geometry, draw);
+            check(&settings, geometry.clone(), draw);
+            let bounds = geometry.bounds();
+            let rays: Vec<_> = (0..300).map(|_| generic_ray(draw, &bounds)).collect();
+            check(&BuildSettings { rays: RaySample::new(&rays), ..settings }, geometry, draw);
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Planes from min-max bins (Shevtsov, Soupikov and Kapustin 2007), settled at exact positions.
 
-use super::tally::{AxisMeasure, Best, LANES, Lanes, Tally, block_width};
+use super::tally::{AxisMeasure, Best, LANES, Lanes, Tally, block_width, mixed_parts};
 use super::{NodeView, PlaneSearch, SearchBuffers, Sweep, priced_plane};
 use crate::build::fragment::Fragment;
 use crate::build::plane::{CellAreas, Counts, Plane, Pricing};
+use crate::build::rays::NodeRays;
 use crate::cost::MacDonaldBooth;
 use glam::Vec4;
 use rayon::prelude::*;
@@ -22,6 +23,8 @@ const ZOOMS: usize = 3;
 /// ends are then tried, the interval being sampled again until they are few. In a small node all
 /// starts and ends are tried at once, which is the exact minimum.
 ///
+/// Where sample rays meet the node, its children weigh by them too ([`NodeRays`]).
+///
 /// What is returned has true counts and lies at a start or end of a fragment; what may be missed in
 /// a large node is a cheaper plane in a bin whose boundaries look dear.
 ///
@@ -37,11 +40,12 @@ pub(crate) struct Binned {
 /// Fragments counted at a time: by one thread, and few enough for exact sums in `f32`.
 const PIECE: usize = 1 << 16;
 
-/// The fragments of a node, counted in pieces.
+/// The fragments of a node, counted in pieces, and its rays.
 #[derive(Clone, Copy)]
 struct Pieces<'a> {
     all: &'a [Fragment],
     parallel: bool,
+    rays: Option<NodeRays<'a>>,
 }
 
 impl Pieces<'_> {
@@ -63,8 +67,18 @@ impl Pieces<'_> {
         sum
     }
 
-    fn tally(&self, axis: usize, positions: &Lanes, any_planar: bool) -> Tally {
-        self.sum(|piece| Tally::of(piece, axis, positions, any_planar), Tally::add)
+    /// Counts what lies beside some positions and offers them.
+    #[inline]
+    fn offer(&self, positions: &Lanes, measure: &AxisMeasure, any_planar: bool, best: &mut Best) {
+        let axis = measure.axis();
+        let tally = self.sum(|piece| Tally::of(piece, axis, positions, any_planar), Tally::add);
+        match &self.rays {
+            None => best.offer(measure, positions, &tally),
+            Some(rays) => {
+                let shares = measure.shares(positions).with_rays(rays, axis, positions);
+                best.offer_shared(measure, positions, &tally, &shares);
+            }
+        }
     }
 }
 
@@ -74,9 +88,9 @@ impl PlaneSearch for Binned {
     }
 
     fn best_plane(&self, node: &NodeView<'_>, buffers: &mut SearchBuffers) -> Option<Plane> {
-        let pricing = &self.exact.pricing;
+        let pricing = &self.exact.pricing.where_crowded(node.crowding);
         let count = node.fragments.len();
-        let fragments = Pieces { all: node.fragments, parallel: self.parallel };
+        let fragments = Pieces { all: node.fragments, parallel: self.parallel, rays: node.rays };
         let tight = fragments.sum(Tight::of, Tight::add);
         let areas = std::array::from_fn(|axis| CellAreas::new(&node.cell, axis));
         let face = tight.best_face(fragments, &areas, pricing);
@@ -98,7 +112,7 @@ impl PlaneSearch for Binned {
         } else {
             return self.swept(node, buffers);
         };
-        match (face, inner.plane(&areas, count, pricing)) {
+        match (face, inner.plane(&areas, count, pricing, node.rays.as_ref())) {
             (Some(face), Some(inner)) => Some(if inner.cost < face.cost { inner } else { face }),
             (face, inner) => face.or(inner),
         }
@@ -117,7 +131,8 @@ impl Binned {
             events.sort_unstable();
         }
         let view = NodeView { events: [&events[0], &events[1], &events[2]], ..*node };
-        let plane = self.exact.best_plane(&view, buffers);
+        let pricing = self.exact.pricing.where_crowded(node.crowding);
+        let plane = Sweep { pricing, ..self.exact }.best_plane(&view, buffers);
         buffers.events = events;
         plane
     }
@@ -179,10 +194,9 @@ impl Candidates {
 
     /// Counts and offers all of them.
     #[inline]
-    fn offer(&self, fragments: Pieces<'_>, axis: usize, measure: &AxisMeasure, best: &mut Best) {
+    fn offer(&self, fragments: Pieces<'_>, measure: &AxisMeasure, best: &mut Best) {
         for positions in self.positions[..self.len].as_chunks::<LANES>().0 {
-            let tally = fragments.tally(axis, positions, self.any_planar);
-            best.offer(measure, positions, &tally);
+            fragments.offer(positions, measure, self.any_planar, best);
         }
     }
 }
@@ -254,7 +268,8 @@ impl Tight {
         for axis in 0..3 {
             let Some(areas) = &areas[axis] else { continue };
             let mut offer = |position, counts| {
-                let plane = priced_plane(areas, axis, position, counts, count, pricing);
+                let parts = mixed_parts(areas, axis, position, fragments.rays.as_ref());
+                let plane = priced_plane(areas, parts, axis, position, counts, count, pricing);
                 if plane.is_some_and(|p| best.is_none_or(|b| p.cost < b.cost)) {
                     best = plane;
                 }
@@ -295,7 +310,7 @@ impl Tight {
         for (axis, measure) in measures.iter().enumerate() {
             let Some(measure) = measure else { continue };
             candidates.collect(fragments.all, axis, self.inside(axis));
-            candidates.offer(fragments, axis, measure, &mut best);
+            candidates.offer(fragments, measure, &mut best);
         }
         best
     }
@@ -308,9 +323,13 @@ impl Tight {
         candidates: &mut Candidates,
     ) -> Best {
         let grid = Grid::over(self);
-        let bins = fragments.sum(|piece| Bins::of(piece, &grid), Bins::add);
+        let bins = fragments.sum(|piece| Bins::of(piece, &grid, |bin| bin), Bins::add);
+        let rays = fragments.rays.map(|rays| {
+            let clamped = |bin: Vec4| bin.max(Vec4::ZERO).min(Vec4::splat((BINS - 1) as f32));
+            (rays, Bins::of(rays.parts, &grid, clamped))
+        });
         let mut boundaries: [Option<Boundary>; 3] = std::array::from_fn(|axis| {
-            measures[axis].as_ref().and_then(|m| bins.best_boundary(axis, m, &grid))
+            measures[axis].as_ref().and_then(|m| bins.best_boundary(m, &grid, rays.as_ref()))
         });
         boundaries.sort_by(|a, b| match (a, b) {
             (Some(a), Some(b)) => a.measure.total_cmp(&b.measure),
@@ -374,11 +393,13 @@ impl Grid {
 }
 
 impl Bins {
-    fn of(fragments: &[Fragment], grid: &Grid) -> Self {
+    /// `inside` moves positions outside of the grid, in bins, into it.
+    #[inline]
+    fn of(fragments: &[Fragment], grid: &Grid, inside: impl Fn(Vec4) -> Vec4) -> Self {
         let mut bins = Bins { starts: [[0; BINS]; 3], ends: [[0; BINS]; 3] };
         for f in fragments {
             let bin = |corner: Vec4| {
-                ((corner - grid.origin) * grid.scale + Vec4::splat(ROUNDING))
+                (inside((corner - grid.origin) * grid.scale) + Vec4::splat(ROUNDING))
                     .to_array()
                     .map(|x| x.to_bits() as usize & (BINS - 1))
             };
@@ -399,23 +420,41 @@ impl Bins {
         add(&mut self.ends, &other.ends);
     }
 
-    /// The cheapest boundary between two bins.
-    fn best_boundary(&self, axis: usize, measure: &AxisMeasure, grid: &Grid) -> Option<Boundary> {
-        let mut samples = Best::NONE;
+    /// How many lie below and above each boundary of bins on an axis.
+    fn beside(&self, axis: usize) -> [[f32; BINS]; 2] {
+        let mut beside = [[0.0; BINS]; 2];
         let (mut left, mut right) = (0, self.ends[axis].iter().sum::<u32>());
+        for bin in 0..BINS {
+            (beside[0][bin], beside[1][bin]) = (left as f32, right as f32);
+            left += self.starts[axis][bin];
+            right -= self.ends[axis][bin];
+        }
+        beside
+    }
+
+    /// The cheapest boundary between two bins.
+    fn best_boundary(
+        &self,
+        measure: &AxisMeasure,
+        grid: &Grid,
+        rays: Option<&(NodeRays<'_>, Bins)>,
+    ) -> Option<Boundary> {
+        let axis = measure.axis();
+        let mut samples = Best::NONE;
+        let [left, right] = self.beside(axis);
+        let rays = rays.map(|(rays, bins)| (rays, bins.beside(axis)));
         let (origin, step) = (grid.edge(axis, 0), 1.0 / grid.scale[axis]);
         for half in 0..BINS / LANES {
-            let mut tally = Tally::ZERO;
-            let mut positions = [0.0; LANES];
-            for c in 0..LANES {
-                let bin = half * LANES + c;
-                tally.left[c] = left as f32;
-                tally.right[c] = right as f32;
-                positions[c] = origin + bin as f32 * step;
-                left += self.starts[axis][bin];
-                right -= self.ends[axis][bin];
+            let at = |counts: &[f32; BINS]| -> Lanes {
+                std::array::from_fn(|c| counts[half * LANES + c])
+            };
+            let tally = Tally { left: at(&left), right: at(&right), ..Tally::ZERO };
+            let positions = std::array::from_fn(|c| origin + (half * LANES + c) as f32 * step);
+            let mut shares = measure.shares(&positions);
+            if let Some((rays, [left, right])) = &rays {
+                shares = shares.mixed(rays, &at(left), &at(right));
             }
-            samples.offer(measure, &positions, &tally);
+            samples.offer_shared(measure, &positions, &tally, &shares);
         }
         let (position, measure) = samples.cheapest()?;
         let bin = ((position - origin) * grid.scale[axis]).round() as usize;
@@ -439,9 +478,8 @@ fn search_interval(
             break;
         }
         let positions = spread(interval);
-        let tally = fragments.tally(axis, &positions, true);
         let mut samples = Best::NONE;
-        samples.offer(measure, &positions, &tally);
+        fragments.offer(&positions, measure, true, &mut samples);
         let Some((position, _)) = samples.cheapest() else { break };
         let step = (interval.1 - interval.0) / LANES as f32;
         interval = ((position - step).max(interval.0), (position + step).min(interval.1));
@@ -451,7 +489,7 @@ fn search_interval(
         let middle = 0.5 * (interval.0 + interval.1);
         candidates.set(&beside(fragments.all, axis, (middle, middle), inside));
     }
-    candidates.offer(fragments, axis, measure, best);
+    candidates.offer(fragments, measure, best);
 }
 
 /// Evenly spaced positions in a range; the last one is its end.

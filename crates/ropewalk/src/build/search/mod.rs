@@ -16,6 +16,7 @@ pub(super) use sweep::Sweep;
 use super::event::Event;
 use super::fragment::Fragment;
 use super::plane::{CellAreas, Counts, Plane, Pricing};
+use super::rays::NodeRays;
 use crate::aabb::Aabb;
 use crate::cost::MacDonaldBooth;
 use crate::primitive::AreaRamp;
@@ -28,6 +29,10 @@ pub(crate) struct NodeView<'a> {
     pub fragments: &'a [Fragment],
     /// Sorted events per axis; empty unless the search uses events.
     pub events: [&'a [Event]; 3],
+    /// Sample rays, where enough of them meet the node. Read by [`Binned`] alone.
+    pub rays: Option<NodeRays<'a>>,
+    /// How much likelier than by its surface area a ray meets the node; 1 without rays.
+    pub crowding: f64,
 }
 
 /// Buffers of the searches, kept between nodes.
@@ -57,13 +62,15 @@ fn direct_plane(
     pricing: &Pricing,
 ) -> Option<Plane> {
     let counts = Counts::of(node.fragments, axis, position);
-    priced_plane(areas, axis, position, counts, node.fragments.len(), pricing)
+    let parts = areas.parts(position);
+    priced_plane(areas, parts, axis, position, counts, node.fragments.len(), pricing)
 }
 
-/// The same where the counts are known.
+/// The same where the counts and the areas of the children are known.
 #[inline]
 fn priced_plane(
     areas: &CellAreas,
+    parts: (f64, f64),
     axis: usize,
     position: f32,
     counts: Counts,
@@ -80,7 +87,7 @@ fn priced_plane(
             continue;
         }
         let children = (left, right);
-        let cost = pricing.price(&MacDonaldBooth, areas, position, total, children, (0.0, 0.0));
+        let cost = pricing.price_parts(&MacDonaldBooth, areas, parts, total, children, (0.0, 0.0));
         if best.is_none_or(|b| cost < b.cost) {
             best = Some(Plane { axis, position, planar_left, cost, left, right });
         }

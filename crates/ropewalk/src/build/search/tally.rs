@@ -6,6 +6,7 @@
 
 use crate::build::fragment::Fragment;
 use crate::build::plane::{CellAreas, Plane, Pricing};
+use crate::build::rays::{NodeRays, is_above};
 use crate::cost::{LeafCost, MacDonaldBooth};
 
 /// Positions in a tally.
@@ -54,6 +55,40 @@ impl Tally {
             }
         }
         tally
+    }
+}
+
+/// The probabilities that a ray which meets a cell meets its parts below and above some positions.
+#[derive(Clone, Copy)]
+pub(super) struct Shares {
+    below: Lanes,
+    above: Lanes,
+}
+
+impl Shares {
+    /// Mixed with the shares of a node's rays, which are counted here.
+    #[inline]
+    pub fn with_rays(self, rays: &NodeRays<'_>, axis: usize, positions: &Lanes) -> Self {
+        let (mut left, mut right) = ([0.0; LANES], [0.0; LANES]);
+        for part in rays.parts {
+            let (lo, hi) = (part.min(axis), part.max(axis));
+            for c in 0..LANES {
+                left[c] += if lo < positions[c] { 1.0 } else { 0.0 };
+                right[c] += if is_above(lo, hi, positions[c]) { 1.0 } else { 0.0 };
+            }
+        }
+        self.mixed(rays, &left, &right)
+    }
+
+    /// Mixed with the shares of a node's rays of which so many are below and above.
+    #[inline]
+    pub fn mixed(self, rays: &NodeRays<'_>, left: &Lanes, right: &Lanes) -> Self {
+        let (of_area, of_ray) = rays.weights();
+        let (of_area, of_ray) = (of_area as f32, of_ray as f32);
+        let mix = |areas: &Lanes, rays: &Lanes| {
+            std::array::from_fn(|c| of_area * areas[c] + of_ray * rays[c])
+        };
+        Shares { below: mix(&self.below, left), above: mix(&self.above, right) }
     }
 }
 
@@ -108,12 +143,25 @@ impl AxisMeasure {
         }
     }
 
+    /// The axis.
     #[inline(always)]
-    fn of(&self, position: f32, left: f32, right: f32) -> f32 {
+    pub fn axis(&self) -> usize {
+        self.axis
+    }
+
+    /// The shares of the cell's area.
+    #[inline(always)]
+    pub fn shares(&self, positions: &Lanes) -> Shares {
+        Shares {
+            below: std::array::from_fn(|c| self.caps + self.rim * (positions[c] - self.lo)),
+            above: std::array::from_fn(|c| self.caps + self.rim * (self.hi - positions[c])),
+        }
+    }
+
+    #[inline(always)]
+    fn of(&self, (below, above): (f32, f32), left: f32, right: f32) -> f32 {
         let blocks = |n: f32| n * self.per_block + self.bias + ROUNDING - ROUNDING;
         let (l, r) = (blocks(left), blocks(right));
-        let below = self.caps + self.rim * (position - self.lo);
-        let above = self.caps + self.rim * (self.hi - position);
         let measure = below * l + above * r + self.size_price * (l + r);
         if left + right >= self.useless { f32::INFINITY } else { measure }
     }
@@ -153,11 +201,25 @@ impl Best {
     /// Offers all positions of a tally, with what lies in them on either side.
     #[inline]
     pub fn offer(&mut self, measure: &AxisMeasure, positions: &Lanes, tally: &Tally) {
+        self.offer_shared(measure, positions, tally, &measure.shares(positions));
+    }
+
+    /// The same with the probabilities given.
+    #[inline]
+    pub fn offer_shared(
+        &mut self,
+        measure: &AxisMeasure,
+        positions: &Lanes,
+        tally: &Tally,
+        shares: &Shares,
+    ) {
         let axis = measure.axis as f32;
         let with = |a: &Lanes, b: &Lanes| std::array::from_fn(|c| a[c] + b[c]);
-        self.take(measure, positions, &with(&tally.left, &tally.planar), &tally.right, axis + 4.0);
+        let lower = with(&tally.left, &tally.planar);
+        self.take(measure, positions, shares, (&lower, &tally.right), axis + 4.0);
         if tally.planar != [0.0; LANES] {
-            self.take(measure, positions, &tally.left, &with(&tally.right, &tally.planar), axis);
+            let upper = with(&tally.right, &tally.planar);
+            self.take(measure, positions, shares, (&tally.left, &upper), axis);
         }
     }
 
@@ -166,12 +228,12 @@ impl Best {
         &mut self,
         measure: &AxisMeasure,
         positions: &Lanes,
-        left: &Lanes,
-        right: &Lanes,
+        shares: &Shares,
+        (left, right): (&Lanes, &Lanes),
         side: f32,
     ) {
         for c in 0..LANES {
-            let cost = measure.of(positions[c], left[c], right[c]);
+            let cost = measure.of((shares.below[c], shares.above[c]), left[c], right[c]);
             let better = cost < self.measure[c];
             self.measure[c] = if better { cost } else { self.measure[c] };
             self.position[c] = if better { positions[c] } else { self.position[c] };
@@ -198,6 +260,7 @@ impl Best {
         areas: &[Option<CellAreas>; 3],
         total: usize,
         pricing: &Pricing,
+        rays: Option<&NodeRays<'_>>,
     ) -> Option<Plane> {
         let lane = lowest(&self.measure);
         if self.measure[lane] == f32::INFINITY {
@@ -208,7 +271,19 @@ impl Best {
         let (position, planar_left) = (self.position[lane], self.side[lane] >= 4.0);
         let areas = areas[axis].as_ref()?;
         let children = (left, right);
-        let cost = pricing.price(&MacDonaldBooth, areas, position, total, children, (0.0, 0.0));
+        let parts = mixed_parts(areas, axis, position, rays);
+        let cost = pricing.price_parts(&MacDonaldBooth, areas, parts, total, children, (0.0, 0.0));
         Some(Plane { axis, position, planar_left, cost, left, right })
     }
+}
+
+/// The areas of a plane's children, mixed with the shares of a node's rays where it has any.
+#[inline]
+pub(super) fn mixed_parts(
+    areas: &CellAreas,
+    axis: usize,
+    position: f32,
+    rays: Option<&NodeRays<'_>>,
+) -> (f64, f64) {
+    rays.map_or_else(|| areas.parts(position), |rays| rays.areas(areas, axis, position))
 }

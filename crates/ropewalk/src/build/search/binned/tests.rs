@@ -55,7 +55,7 @@ fn search(leaf_cost: LeafCost, size_unit: f64, from: usize) -> Binned {
 fn node(fragments: &[Fragment], margin: f32) -> NodeView<'_> {
     let tight = fragments.iter().fold(Aabb::EMPTY, |b, f| b.union(&f.bounds()));
     let cell = Aabb::new(tight.min.map(|x| x - margin), tight.max.map(|x| x + margin));
-    NodeView { cell, depth: 0, fragments, events: [&[] as &[Event]; 3] }
+    NodeView { cell, depth: 0, fragments, events: [&[] as &[Event]; 3], rays: None, crowding: 1.0 }
 }
 
 proptest! {

@@ -87,6 +87,8 @@ fn check<M: CostModel>(model: M, geometry: &Geometry, estimator: TerminationEsti
         depth: 0,
         fragments: arena.fragments(&size),
         events: arena.events(&size),
+        rays: None,
+        crowding: 1.0,
     };
     let found = search.best_plane(&node, &mut SearchBuffers::default());
     let expected = brute_force(&search, &node);
