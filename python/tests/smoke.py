@@ -136,7 +136,8 @@ def calls():
         [thread.start() for thread in threads]
         [thread.join() for thread in threads]
         assert all((t == hits.t).all() for t in results)
-        del opened, others
+        del opened
+        others.clear()
     try:
         ropewalk.Scene(vertices, faces + len(vertices))
     except ropewalk.ArgumentError as error:
