@@ -20,9 +20,9 @@ pub use header::{
     FORMAT_VERSION, HEADER_BYTES, LAYOUT_VERSION, MAGIC, MAX_SECTIONS, SECTION_ALIGNMENT, Section,
     Tag,
 };
-pub use open::{Check, Extra, Opened, open};
+pub use open::{Check, Extra, Opened, open, open_monitored};
 pub use shapes::{ShapeRows, read_shapes, write_shapes};
-pub use write::{Contents, Written, write};
+pub use write::{Contents, Written, write, write_monitored};
 
 use crate::geometry::Geometry;
 
