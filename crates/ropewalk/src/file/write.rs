@@ -153,7 +153,7 @@ pub fn write(contents: &Contents<'_>, out: &mut impl Write) -> Result<Written, W
 /// The same, until the monitor cancels it; it is asked every few milliseconds.
 ///
 /// # Errors
-/// As [`write`], and [`WriteError::Cancelled`].
+/// As [`write()`], and [`WriteError::Cancelled`].
 pub fn write_monitored(
     contents: &Contents<'_>,
     out: &mut impl Write,
