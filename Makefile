@@ -46,7 +46,7 @@ inlined: tools
 	@echo "==> vector instructions inlined"
 	@scripts/inlined
 
-python: tools ## Install the Python package into a fresh virtual environment and test it there (needs python3)
+python: tools ## Build a wheel of the Python package and test it in fresh virtual environments (needs python3)
 	@echo "==> the Python package"
 	@scripts/test-python
 

@@ -37,6 +37,8 @@ def walk(
     lengths: _F32,
     stop: bool,
     threads: int,
+    masks: _U32 | None = None,
+    faces: str = "both",
 ) -> tuple[
     tuple[_F32, _U32],
     tuple[_I64, _I32, _F32, _I32, _I32, NDArray[np.bool_]],

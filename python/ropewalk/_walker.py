@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._arrays import ArrayLike, as_array, as_float32, as_rows, as_threads, per_ray
+from ._arrays import (
+    ArrayLike,
+    as_array,
+    as_choice,
+    as_float32,
+    as_masks,
+    as_rows,
+    as_threads,
+    per_ray,
+)
 from ._errors import ArgumentError, ArgumentTypeError, InvalidRayWarning
+from ._hits import Hits
 from ._ropewalk import cells_of, walk
 from ._scene import Scene
 
@@ -74,7 +84,8 @@ class Walker:
     once. Every face that it crosses is reported, exactly once, and it is decided without rounding which
     these are: also where segments end in faces, on edges or in vertices, and where particles turn there,
     none is missed or counted twice. A point in a face counts as on the side to which a step along +x
-    leads (+y, +z if the face is parallel to that). No answer depends on the number of threads.
+    leads (+y, +z if the face is parallel to that). No answer depends on the number of threads. Threads can share
+    a scene but not a walker: each call moves its particles.
 
     Raises:
         ArgumentError: wrong shapes; a scene with other primitives, when particles are moved.
@@ -137,7 +148,14 @@ class Walker:
         return f"<ropewalk.Walker: {len(self)} particles in {self._scene!r}>"
 
     def advance(
-        self, directions: ArrayLike, lengths: ArrayLike = 1.0, *, stop: bool = False
+        self,
+        directions: ArrayLike,
+        lengths: ArrayLike = 1.0,
+        *,
+        stop: bool = False,
+        masks: ArrayLike | None = None,
+        skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
     ) -> Events:
         """Moves each particle along one segment.
 
@@ -146,6 +164,13 @@ class Walker:
             lengths: 0 or more, in lengths of the direction: a number, or one a particle.
             stop: particles stop at the first face that they meet. They then stand in it, and pass it in
                 their next segment without an event, to whichever side that leads.
+            masks: 32 bits for all particles or a particle; see :meth:`Scene.from_meshes`. Faces of meshes
+                without a common bit are no events and stop nothing.
+            skip: a face that the first segment of each particle passes without an event, usually the one
+                from which it starts, as for :meth:`Scene.closest_hit`; -1 is none. It takes the place of
+                the face at which the particle was stopped.
+            faces: ``"front"`` if only particles that enter (from the front to the back) meet a face,
+                ``"back"`` if only those that leave.
 
         Segments with a number that is NaN, infinite or beyond 1e30, or with a negative length, are left
         out and counted in an ``InvalidRayWarning``.
@@ -167,7 +192,8 @@ class Walker:
             )
         array = np.broadcast_to(array, (n, 3))
         length = np.broadcast_to(per_ray(as_array(lengths, "lengths"), (n,), "lengths"), (n,))
-        return self._walk(np.arange(n + 1, dtype=np.int64), array, length, stop)
+        rows = np.arange(n + 1, dtype=np.int64)
+        return self._walk(rows, array, length, stop, masks, skip, faces)
 
     def run(
         self,
@@ -176,6 +202,9 @@ class Walker:
         lengths: ArrayLike,
         *,
         stop: bool = False,
+        masks: ArrayLike | None = None,
+        skip: ArrayLike | Hits | tuple[ArrayLike, ArrayLike] | None = None,
+        faces: str = "both",
     ) -> Events:
         """Moves each particle along a list of segments, each from where the one before ended.
 
@@ -185,6 +214,7 @@ class Walker:
             directions: shape (S, 3).
             lengths: (S,), or a number.
             stop: particles stop at the first face that they meet and leave out the rest of their list.
+            masks, skip, faces: as for :meth:`advance`.
 
         Raises:
             ArgumentError, ArgumentTypeError: as :class:`Walker`.
@@ -212,21 +242,37 @@ class Walker:
             raise ArgumentError(
                 f"offsets: expected numbers from 0 to {len(array)} that do not descend", "offsets"
             )
-        return self._walk(np.ascontiguousarray(rows, np.int64), array, length, stop)
+        rows = np.ascontiguousarray(rows, np.int64)
+        return self._walk(rows, array, length, stop, masks, skip, faces)
 
     def _walk(
-        self, offsets: NDArray[np.int64], directions: np.ndarray, lengths: np.ndarray, stop: bool
+        self,
+        offsets: NDArray[np.int64],
+        directions: np.ndarray,
+        lengths: np.ndarray,
+        stop: bool,
+        masks: Any,
+        skip: Any,
+        faces: str,
     ) -> Events:
-        few = len(directions) <= _FEW_SEGMENTS
+        few, shape = len(directions) <= _FEW_SEGMENTS, self._stopped.shape
+        sides = as_choice(faces, "faces", ("both", "front", "back"))
+        bits = None if masks is None else per_ray(as_masks(masks, "masks"), shape, "masks")
+        passed = self._stopped
+        if skip is not None:
+            numbered = self._scene._skip(skip, shape)
+            passed = np.where(numbered < 0, passed, numbered.view(np.uint32))
         state, rows, walked, invalid = walk(
             self._scene._core,
             self._positions.reshape(-1),
-            self._stopped,
+            passed,
             offsets,
             as_float32(directions).reshape(-1),
             as_float32(lengths),
             bool(stop),
             1 if few else self._threads,
+            bits,
+            sides,
         )
         self._positions, self._stopped = state[0].reshape(-1, 3), state[1]
         events = Events()

@@ -167,6 +167,37 @@ def test_many_threads_share_a_scene():
         np.testing.assert_array_equal(t, EXPECTED.t)
 
 
+def test_many_threads_ask_for_the_same_at_once():
+    """What is worked out when first asked for is the same for all, GIL or not."""
+    scene = ropewalk.Scene(VERTICES, FACES)
+    hits, lists = scene.closest_hit(ORIGINS, DIRECTIONS), scene.all_hits(ORIGINS[:2000], DIRECTIONS[:2000])
+    start, results = threading.Barrier(6), [None] * 6
+
+    def work(i):
+        start.wait()
+        results[i] = [
+            hits.position, hits.normal, hits.uv, hits.cell, lists.position, lists.ray_id, scene.report.leaves,
+            scene.winding_number(ORIGINS[:500]), scene.occluded(ORIGINS, DIRECTIONS, t_max=0.1, start=hits),
+            ropewalk.Scene(VERTICES[:90], np.arange(90).reshape(30, 3), threads=1 + i).report.leaves,
+        ]  # fmt: skip
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(6)]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    for result in results:
+        for found, expected in zip(result, results[0], strict=True):
+            np.testing.assert_array_equal(found, expected)
+
+
+def test_the_module_needs_no_gil():
+    """On an interpreter that can do without, the import must not take it back."""
+    import sysconfig
+
+    if not sysconfig.get_config_var("Py_GIL_DISABLED"):
+        pytest.skip("this interpreter has a GIL; free-threaded ones are tested where there is one")
+    assert not sys._is_gil_enabled()
+
+
 INTERRUPTED = """
     import os, signal, threading, time, numpy as np, ropewalk
     # A shell that starts tests in the background has them ignore it.
@@ -229,6 +260,37 @@ def test_ctrl_c_stops_a_query_about_points(query, threads):
     ))
     assert float(late) < 5
     assert near == "9"
+
+
+SAVED = "scene = ropewalk.Scene(v, f, preset='fast'); scene.save(name)"
+OBJ = "open(name, 'w').write('v 0.5 1.25 0\\nv 1 0 0\\nv 0 1 0\\nf -1 -2 -3\\n' * 200_000)"
+NFF = "open(name, 'w').write('p 3\\n0 0 0\\n1 0 0\\n0 1 0\\n' * 200_000)"
+
+
+@posix
+@pytest.mark.parametrize(
+    "name, prepare, work",
+    [
+        ("a.rope", SAVED, "scene.save(name)"),
+        ("a.rope", SAVED, "ropewalk.Scene.open(name, verify=True)"),
+        ("a.rope", SAVED, "ropewalk.Scene.open(name, copy=True, vertices=v, faces=f)"),
+        ("a.obj", OBJ, "ropewalk.read_mesh(name)"),
+        ("a.nff", NFF, "ropewalk.load(name)"),
+    ],
+)
+def test_ctrl_c_stops_work_on_files(name, prepare, work, tmp_path):
+    """That it stops in the middle is tested in Rust; here, that it is an exception and leaves nothing behind."""
+    path = str(tmp_path / name)
+    late, *there = python(INTERRUPTED.format(
+        triangles=200_000,
+        prepare=f"name = {path!r}; {prepare}",
+        work=work,
+        after="print(*os.listdir(os.path.dirname(name)))",
+    ))
+    assert float(late) < 5
+    assert there == [name]
+    if name == "a.rope":
+        assert len(ropewalk.Scene.open(path, verify=True)) == 200_000
 
 
 def test_progress_is_reported():

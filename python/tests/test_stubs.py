@@ -78,7 +78,10 @@ def test_everything_public_is_exported_and_documented():
     assert pathlib.Path(ropewalk.__file__).with_name("py.typed").exists()
 
 
-MODULES = ["ropewalk", "ropewalk._mesh", "ropewalk._scene", "ropewalk._hits", "ropewalk._points", "ropewalk._report"]
+MODULES = ["ropewalk"] + [
+    f"ropewalk._{name}"
+    for name in ("file", "hits", "mesh", "points", "rays", "report", "scene", "walker")
+]
 
 
 @pytest.mark.parametrize("module", MODULES)

@@ -79,6 +79,75 @@ def test_particles_stop_at_the_closest_hit():
     assert not (behind.prim_id == on[behind.particle_id]).any()
 
 
+def test_masks_and_faces_leave_out_events():
+    """In Pass mode they change nothing but the events; a stop is at the first that is left."""
+    draw = np.random.default_rng(5)
+    meshes = [random_mesh(draw, 150, 2.0) for _ in range(3)]
+    scene = ropewalk.Scene.from_meshes(meshes, masks=[1, 6, 12])
+    n, steps = 9000, 4
+    start = draw.uniform(-1, 1, (n, 3))
+    directions = draw.normal(size=(n * steps, 3)).astype(np.float32)
+    rows, bits = np.arange(n + 1) * steps, draw.integers(0, 16, n)
+    plain = ropewalk.Walker(scene, start)
+    every = plain.run(rows, directions, 0.5)
+    names = ("particle_id", "segment", "t", "prim_id", "geom_id", "entering")
+    for masks, faces in ((bits, "both"), (None, "front"), (4, "back"), (bits, "front"), (0, "both"), (-1, "back")):
+        each = np.broadcast_to(-1 if masks is None else masks, n)[every.particle_id]
+        left = (each & np.array([1, 6, 12])[every.geom_id]) != 0
+        if faces != "both":
+            left &= every.entering == (faces == "front")
+        for threads in (1, 2):
+            walker = ropewalk.Walker(scene, start, threads=threads)
+            events = walker.run(rows, directions, 0.5, masks=masks, faces=faces)
+            assert (walker.positions == plain.positions).all()
+            for name in names:
+                np.testing.assert_array_equal(getattr(events, name), getattr(every, name)[left])
+            stopper = ropewalk.Walker(scene, start, threads=threads)
+            stops = stopper.run(rows, directions, 0.5, stop=True, masks=masks, faces=faces)
+            _, first = np.unique(every.particle_id[left], return_index=True)
+            for name in names:
+                np.testing.assert_array_equal(getattr(stops, name), getattr(events, name)[first])
+            assert stopper.stopped.sum() == len(first)
+
+
+def test_skip_is_the_face_that_a_particle_leaves():
+    scene = ropewalk.Scene.from_meshes([random_mesh(np.random.default_rng(6), 300, 2.0), box(-5.0, 5.0)])
+    draw = np.random.default_rng(6)
+    hits = scene.closest_hit(draw.uniform(-1, 1, (2000, 3)), draw.normal(size=(2000, 3)))
+    assert hits.hit.all()
+    ways = draw.normal(size=(2000, 3)).astype(np.float32)
+    for skip in (hits, (hits.prim_id, hits.geom_id)):
+        walker = ropewalk.Walker(scene, hits.position)
+        events = walker.advance(ways, 0.5, skip=skip)
+        left = np.stack([hits.prim_id, hits.geom_id])[:, events.particle_id]
+        assert not (left == [events.prim_id, events.geom_id]).all(axis=0).any()
+    # All else is met, and nothing but the first segment has a face to skip.
+    every = ropewalk.Walker(scene, hits.position).advance(ways, 0.5)
+    left = np.stack([hits.prim_id, hits.geom_id])[:, every.particle_id]
+    other = ~(left == [every.prim_id, every.geom_id]).all(axis=0)
+    np.testing.assert_array_equal(events.t, every.t[other])
+    flat = ropewalk.Scene([[-9, -9, 0], [9, -9, 0], [0, 9, 0]], [[0, 1, 2]])
+    walker = ropewalk.Walker(flat, [[0, 0, -1], [0, 0, -1]])
+    events = walker.run([0, 2, 4], [[0, 0, 2], [0, 0, -2]] * 2, 1, skip=[0, -1])
+    assert events.segment.tolist() == [1, 0, 1] and events.counts.tolist() == [1, 2]
+    # One that is stopped passes its face, or the one that is skipped instead of it.
+    walker = ropewalk.Walker(flat, [[0, 0, -1]])
+    assert len(walker.advance([0, 0, 1], 2, stop=True)) == 1 and walker.stopped.all()
+    assert len(walker.advance([0, 0, 1], 1, skip=-1)) == 0
+    for call in (
+        lambda: walker.advance([0, 0, 1], skip=1),
+        lambda: walker.advance([0, 0, 1], skip=[0, 0]),
+        lambda: walker.advance([0, 0, 1], masks=2**32),
+        lambda: walker.advance([0, 0, 1], masks=[1, 2]),
+        lambda: walker.advance([0, 0, 1], faces="left"),
+    ):
+        with pytest.raises(ropewalk.ArgumentError):
+            call()
+    for call in (lambda: walker.advance([0, 0, 1], masks=1.5), lambda: walker.advance([0, 0, 1], faces=1)):
+        with pytest.raises(ropewalk.ArgumentTypeError):
+            call()
+
+
 def test_bad_input_is_refused():
     scene = ropewalk.Scene(*box(-1.0, 1.0))
     walker = ropewalk.Walker(scene, [[0, 0, 0], [5, 5, 5]])

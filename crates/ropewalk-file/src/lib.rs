@@ -24,6 +24,7 @@ mod map;
 
 pub use map::is_saved_scene;
 
+use ropewalk::build::Monitor;
 use ropewalk::file::{AnyOpened, Check, Contents, FileError, Opened, WriteError, Written};
 use ropewalk_scene::write_atomically;
 use std::io;
@@ -77,8 +78,21 @@ pub enum OpenError {
 /// # Errors
 /// [`SaveError`]; see [`write_atomically`].
 pub fn save(path: impl AsRef<Path>, contents: &Contents<'_>) -> Result<Written, SaveError> {
+    save_monitored(path, contents, &())
+}
+
+/// The same, until the monitor cancels it: then nothing is left behind.
+///
+/// # Errors
+/// As [`save`]; the source is [`WriteError::Cancelled`].
+pub fn save_monitored(
+    path: impl AsRef<Path>,
+    contents: &Contents<'_>,
+    monitor: &dyn Monitor,
+) -> Result<Written, SaveError> {
     let path = path.as_ref();
-    let saved = write_atomically(path, |out| ropewalk::file::write(contents, out));
+    let saved =
+        write_atomically(path, |out| ropewalk::file::write_monitored(contents, out, monitor));
     saved.map_err(|source| SaveError { path: path.to_owned(), source })
 }
 
@@ -93,8 +107,7 @@ pub fn save(path: impl AsRef<Path>, contents: &Contents<'_>) -> Result<Written, 
 /// # Errors
 /// [`OpenError`].
 pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Opened, OpenError> {
-    let path = path.as_ref();
-    map::map(path).and_then(|bytes| opened(path, &bytes, check))
+    single(path.as_ref(), open_any(&path, check)?)
 }
 
 /// [`open`] for a scene of either precision.
@@ -102,17 +115,20 @@ pub fn open(path: impl AsRef<Path>, check: Check) -> Result<Opened, OpenError> {
 /// # Errors
 /// [`OpenError`].
 pub fn open_any(path: impl AsRef<Path>, check: Check) -> Result<AnyOpened, OpenError> {
-    let path = path.as_ref();
-    map::map(path).and_then(|bytes| any_opened(path, &bytes, check))
+    open_monitored(path, check, &())
 }
 
-/// [`read`] for a scene of either precision.
+/// [`open_any`] until the monitor cancels it.
 ///
 /// # Errors
-/// [`OpenError`].
-pub fn read_any(path: impl AsRef<Path>, check: Check) -> Result<AnyOpened, OpenError> {
+/// As there; the source is [`FileError::Cancelled`].
+pub fn open_monitored(
+    path: impl AsRef<Path>,
+    check: Check,
+    monitor: &dyn Monitor,
+) -> Result<AnyOpened, OpenError> {
     let path = path.as_ref();
-    map::read(path).and_then(|bytes| any_opened(path, &bytes, check))
+    map::map(path).and_then(|bytes| opened(path, &bytes, check, monitor))
 }
 
 /// Opens a saved scene by reading it into memory of its own, on huge pages where the system has them: what
@@ -121,24 +137,45 @@ pub fn read_any(path: impl AsRef<Path>, check: Check) -> Result<AnyOpened, OpenE
 /// # Errors
 /// [`OpenError`].
 pub fn read(path: impl AsRef<Path>, check: Check) -> Result<Opened, OpenError> {
-    let path = path.as_ref();
-    map::read(path).and_then(|bytes| opened(path, &bytes, check))
+    single(path.as_ref(), read_any(&path, check)?)
 }
 
-fn any_opened(
-    path: &Path,
-    bytes: &ropewalk::kernel::SharedBytes,
+/// [`read`] for a scene of either precision.
+///
+/// # Errors
+/// [`OpenError`].
+pub fn read_any(path: impl AsRef<Path>, check: Check) -> Result<AnyOpened, OpenError> {
+    read_monitored(path, check, &())
+}
+
+/// [`read_any`] until the monitor cancels it.
+///
+/// # Errors
+/// As there; the source is [`FileError::Cancelled`].
+pub fn read_monitored(
+    path: impl AsRef<Path>,
     check: Check,
+    monitor: &dyn Monitor,
 ) -> Result<AnyOpened, OpenError> {
-    let opened = ropewalk::file::open_any(bytes, check);
-    opened.map_err(|source| OpenError::Content { path: path.to_owned(), source })
+    let path = path.as_ref();
+    map::read(path, monitor).and_then(|bytes| opened(path, &bytes, check, monitor))
+}
+
+fn single(path: &Path, scene: AnyOpened) -> Result<Opened, OpenError> {
+    match scene {
+        AnyOpened::Single(scene) => Ok(*scene),
+        AnyOpened::Double(_) => {
+            Err(OpenError::Content { path: path.to_owned(), source: FileError::Double })
+        }
+    }
 }
 
 fn opened(
     path: &Path,
     bytes: &ropewalk::kernel::SharedBytes,
     check: Check,
-) -> Result<Opened, OpenError> {
-    let opened = ropewalk::file::open(bytes, check);
+    monitor: &dyn Monitor,
+) -> Result<AnyOpened, OpenError> {
+    let opened = ropewalk::file::open_monitored(bytes, check, monitor);
     opened.map_err(|source| OpenError::Content { path: path.to_owned(), source })
 }

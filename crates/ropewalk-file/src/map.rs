@@ -4,6 +4,7 @@
 
 use crate::OpenError;
 use memmap2::{Mmap, MmapMut};
+use ropewalk::build::Monitor;
 use ropewalk::file::{FileError, HEADER_BYTES, MAGIC};
 use ropewalk::kernel::SharedBytes;
 use std::fs::File;
@@ -25,8 +26,11 @@ pub fn map(path: &Path) -> Result<SharedBytes, OpenError> {
     Ok(Arc::new(map))
 }
 
+/// Bytes that are read before the monitor is asked: some milliseconds.
+const PIECE: usize = 1 << 24;
+
 /// The bytes of a file, copied.
-pub fn read(path: &Path) -> Result<SharedBytes, OpenError> {
+pub fn read(path: &Path, monitor: &dyn Monitor) -> Result<SharedBytes, OpenError> {
     let (mut file, len) = open(path)?;
     let refuse = |error| read_error(path, error);
     let mut bytes = MmapMut::map_anon(len).map_err(refuse)?;
@@ -35,7 +39,13 @@ pub fn read(path: &Path) -> Result<SharedBytes, OpenError> {
         // Without huge pages queries are slower, not wrong.
         let _ = bytes.advise(memmap2::Advice::HugePage);
     }
-    file.read_exact(&mut bytes).map_err(refuse)?;
+    for piece in bytes.chunks_mut(PIECE) {
+        if monitor.is_cancelled() {
+            let path = path.to_owned();
+            return Err(OpenError::Content { path, source: FileError::Cancelled });
+        }
+        file.read_exact(piece).map_err(refuse)?;
+    }
     Ok(Arc::new(bytes))
 }
 

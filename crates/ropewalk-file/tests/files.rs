@@ -1,15 +1,17 @@
 //! Saving and opening files, whatever they are called and whatever happens to them.
 
-use ropewalk::build::{BuildSettings, Preset};
-use ropewalk::file::{Check, Contents};
+use ropewalk::build::{BuildSettings, Monitor, Preset};
+use ropewalk::file::{Check, Contents, FileError, WriteError};
 use ropewalk::kernel::{BatchCaster, BatchHit};
 use ropewalk::primitive::Triangle;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, Ray, Sides};
-use ropewalk_file::{OpenError, is_saved_scene, open, read, save};
+use ropewalk_file::{
+    OpenError, is_saved_scene, open, open_monitored, read, read_monitored, save, save_monitored,
+};
 use ropewalk_testkit::rays::{Draw, generic_ray};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 fn soup(triangles: usize, seed: u64) -> (WideTree, Geometry) {
     let (mut draw, mut geometry) = (Draw::new(seed), Geometry::new());
@@ -55,6 +57,51 @@ fn any_name_will_do() {
         }
         std::fs::remove_file(path).unwrap();
     }
+}
+
+/// Cancels when it has been asked so many times.
+struct After(AtomicUsize);
+
+impl Monitor for After {
+    fn is_cancelled(&self) -> bool {
+        self.0.fetch_sub(1, Ordering::Relaxed) == 0
+    }
+}
+
+/// Cancels some work ever later, until it comes to its end; how often it was cancelled.
+fn cancelled(mut work: impl FnMut(&After) -> bool) -> usize {
+    (0..).take_while(|&asks| work(&After(AtomicUsize::new(asks)))).count()
+}
+
+#[test]
+fn what_is_cancelled_leaves_no_file_and_the_old_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.rope");
+    // Some sections are several pieces long.
+    let ((tree, geometry), (other, old)) = (soup(150_000, 4), soup(100, 5));
+    save(&path, &Contents::new(&other, &old)).unwrap();
+    let times = cancelled(|monitor| {
+        let saved = save_monitored(&path, &Contents::new(&tree, &geometry), monitor);
+        assert_eq!(names(folder.path()), ["scene.rope"]);
+        let Err(error) = saved else { return false };
+        assert!(matches!(error.source, WriteError::Cancelled), "{error}");
+        assert_eq!(open(&path, Check::Everything).unwrap().geometry.len(), 100);
+        true
+    });
+    assert!(times > 6, "{times} times");
+    let is_cancelled = |error: OpenError| match error {
+        OpenError::Content { source, .. } => assert_eq!(source, FileError::Cancelled),
+        error => panic!("{error}"),
+    };
+    let times = cancelled(|monitor| {
+        open_monitored(&path, Check::Everything, monitor).map_err(is_cancelled).is_err()
+    });
+    assert!(times > 3, "{times} times");
+    let times = cancelled(|monitor| {
+        read_monitored(&path, Check::Structure, monitor).map_err(is_cancelled).is_err()
+    });
+    assert!(times > 0, "{times} times");
+    assert_eq!(open(&path, Check::Everything).unwrap().geometry.len(), 150_000);
 }
 
 #[test]

@@ -16,7 +16,7 @@ use ropewalk::primitive::{Primitive, Triangle};
 use ropewalk::ray::PreparedRay;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, GeometryError, Hit, Ray, Shape, Sides};
-use ropewalk_scene::{FacetPolicy, NffLimits, load_scene};
+use ropewalk_scene::{FacetPolicy, NffLimits, load_monitored};
 use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -118,7 +118,7 @@ impl Core {
         let count: usize = meshes.iter().map(|mesh| mesh.1.len()).sum();
         left_for_build(memory_limit, 0, count)
             .map_err(|failure| failure.into_exception(one_mesh))?;
-        let make = || triangles(&meshes);
+        let make = |_: &Watch<'_>| triangles(&meshes);
         Self::of(py, make, masks, plan, threads, progress, memory_limit, one_mesh)
     }
 
@@ -135,8 +135,9 @@ impl Core {
         rays: Option<&Rays>,
     ) -> PyResult<Core> {
         let plan = Plan::new(&plan)?.with_rays(sample(py, rays)?);
-        let make = || {
-            let scene = load_scene(path, &NffLimits::default()).map_err(Failure::File)?;
+        let make = |monitor: &Watch<'_>| {
+            let loaded = load_monitored(path, &NffLimits::default(), monitor);
+            let scene = loaded.map_err(Failure::File)?.into_scene();
             let geometry = scene.geometry(FacetPolicy::TwoSided).map_err(Failure::Objects)?;
             let count = geometry.len() as u32;
             Ok((geometry, vec![0, count]))
@@ -164,7 +165,7 @@ impl Core {
             && starts.first() == Some(&0)
             && starts.last().is_some_and(|&n| n as usize == kinds.len());
         let geometry = state::read(kinds, ends, numbers).filter(|_| sound).ok_or_else(bad)?;
-        Self::of(py, || Ok((geometry, starts)), masks, plan, threads, None, None, true)
+        Self::of(py, |_| Ok((geometry, starts)), masks, plan, threads, None, None, true)
     }
 
     /// Everything that makes the scene, as arrays and lists.
@@ -456,7 +457,7 @@ impl Core {
 impl Core {
     fn of(
         py: Python<'_>,
-        make: impl FnOnce() -> Result<Parts, Failure> + Send,
+        make: impl FnOnce(&Watch<'_>) -> Result<Parts, Failure> + Send,
         masks: Vec<u32>,
         plan: Plan,
         threads: usize,
@@ -473,8 +474,8 @@ impl Core {
             None => Ok(()),
         };
         let job = || {
-            let (geometry, starts) = make()?;
             let watch = Watch { stop: &stop, done: &done };
+            let (geometry, starts) = make(&watch)?;
             let memory_limit = left_for_build(memory_limit, 0, geometry.len())?;
             let settings = BuildSettings { memory_limit, ..settings.clone() };
             let (tree, report) =

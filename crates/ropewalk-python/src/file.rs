@@ -8,9 +8,9 @@ use crate::work;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use ropewalk::GeometryError;
-use ropewalk::build::Preset;
+use ropewalk::build::{Monitor, Preset};
 use ropewalk::file::{
-    AnyOpened, Check, Contents, Extra, Figures, Hash, Opened, Tag, short, triangles_hash,
+    AnyOpened, Check, Contents, Extra, Figures, Hash, Opened, Tag, mesh_hash, short, triangles_hash,
 };
 use ropewalk::instance::Object;
 use ropewalk_file::{OpenError, SaveError};
@@ -66,7 +66,8 @@ fn write(
     let numbers = numbers.chain(masks.iter().copied());
     let extra = [Extra { tag: MESHES, bytes: numbers.flat_map(u32::to_le_bytes).collect() }];
     let contents = Contents { figures: Some(&figures), extra: &extra, ..contents };
-    let saved = alone(py, || ropewalk_file::save(&path, &contents))?;
+    let save = |stop: &work::Stop<'_>| ropewalk_file::save_monitored(&path, &contents, stop);
+    let saved = work::alone(py, save)?;
     Ok(saved.map_err(|error: SaveError| error::not_saved(error.to_string()))?.bytes)
 }
 
@@ -84,11 +85,13 @@ pub fn open(
     faces: Option<PyReadonlyArray2<'_, u32>>,
 ) -> PyResult<Py<PyAny>> {
     let check = if verify { Check::Everything } else { Check::Structure };
-    let open = || match copy {
-        true => ropewalk_file::read_any(&path, check),
-        false => ropewalk_file::open_any(&path, check),
+    let open = |stop: &work::Stop<'_>| match copy {
+        true => ropewalk_file::read_monitored(&path, check, stop),
+        false => ropewalk_file::open_monitored(&path, check, stop),
     };
-    let scene = alone(py, open)?.map_err(|error: OpenError| {
+    // A header and links are checked in milliseconds, for which no thread is started.
+    let scene = if verify || copy { work::alone(py, open)? } else { work::here(py, open)? };
+    let scene = scene.map_err(|error: OpenError| {
         let message = error.to_string();
         match error {
             OpenError::Open { .. } => error::file("SceneNotFoundError", message),
@@ -105,7 +108,7 @@ pub fn open(
             let expected = match (&rounded, faces) {
                 (Some(vertices), Some(faces)) => {
                     let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
-                    let hash = alone(py, || triangles(vertices, faces))?;
+                    let hash = work::alone(py, |stop| rounded_hash(vertices, faces, stop))?;
                     Some((faces.len(), hash.map_err(|failure| failure.into_exception(true))?))
                 }
                 _ => None,
@@ -122,8 +125,8 @@ pub fn open(
             let expected = match (&vertices, faces) {
                 (Some(vertices), Some(faces)) => {
                     let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
-                    let hash = alone(py, || ropewalk::file::mesh_hash(vertices, faces))?;
-                    Some((faces.len(), hash))
+                    let hash = work::alone(py, |stop| mesh_hash(vertices, faces, stop))?;
+                    Some((faces.len(), hash.map_err(|error| error::other(error.to_string()))?))
                 }
                 _ => None,
             };
@@ -178,12 +181,6 @@ fn checked(
     Ok((starts, masks))
 }
 
-/// Work on this thread without the GIL; a panic becomes an exception.
-fn alone<T: Send>(py: Python<'_>, work: impl Fn() -> T + Sync) -> PyResult<T> {
-    let mut done = work::for_each(py, 1, vec![()], |()| work())?;
-    done.pop().ok_or_else(|| error::other("nothing was done".into()))
-}
-
 /// First primitives and masks of the meshes of a file: one mesh if it does not say. `None` if what it says
 /// cannot be.
 fn meshes(primitives: usize, extra: &[Extra]) -> Option<(Vec<u32>, Vec<u32>)> {
@@ -202,12 +199,18 @@ fn meshes(primitives: usize, extra: &[Extra]) -> Option<(Vec<u32>, Vec<u32>)> {
 }
 
 /// The hash of the geometry that a scene of one mesh has.
-fn triangles(vertices: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<Hash, Failure> {
+fn rounded_hash(
+    vertices: &[[f32; 3]],
+    faces: &[[u32; 3]],
+    monitor: &dyn Monitor,
+) -> Result<Hash, Failure> {
     let wrong = |i: &u32| *i as usize >= vertices.len();
     if let Some(face) = faces.iter().position(|corners| corners.iter().any(wrong)) {
         let found = faces[face].into_iter().find(wrong).unwrap_or_default();
         let error = GeometryError::Face { face, found, vertices: vertices.len() };
         return Err(Failure::Mesh(0, error));
     }
-    Ok(triangles_hash(faces.iter().map(|corners| corners.map(|i| vertices[i as usize]))))
+    // Half a hash is never looked at: the call raises.
+    let faces = faces.chunks(1 << 14).take_while(|_| !monitor.is_cancelled()).flatten();
+    Ok(triangles_hash(faces.map(|corners| corners.map(|i| vertices[i as usize]))))
 }

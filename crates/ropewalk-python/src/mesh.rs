@@ -1,9 +1,10 @@
 //! Mesh files as arrays.
 
 use crate::error::Failure;
+use crate::work;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use ropewalk_scene::{Loaded, MeshFormat, NffLimits, load};
+use ropewalk_scene::{Loaded, MeshFormat, NffLimits, load_monitored};
 use std::path::Path;
 
 /// Vertices and faces.
@@ -15,7 +16,8 @@ pub fn read_mesh<'py>(py: Python<'py>, path: &str) -> PyResult<Option<Arrays<'py
     if MeshFormat::of_name(Path::new(path)).is_none() {
         return Ok(None);
     }
-    let loaded = py.detach(|| load(path, &NffLimits::default()));
+    let load = |monitor: &work::Stop<'_>| load_monitored(path, &NffLimits::default(), monitor);
+    let loaded = work::alone(py, load)?;
     let loaded = loaded.map_err(|error| Failure::File(error).into_exception(true))?;
     let Loaded::Mesh(_, mesh) = loaded else { return Ok(None) };
     let (v, f) = (mesh.vertices.len(), mesh.faces.len());

@@ -1,11 +1,12 @@
 //! Particles moved along segments, and cells to start from.
 
-use crate::core::{Core, block, blocks, zeros};
-use crate::{error, work};
+use crate::core::{Core, block, blocks, masks_that_refuse, mesh, zeros};
+use crate::{error, rays, work};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
+use ropewalk::Sides;
 use ropewalk::point::{Cell, PointQueries};
-use ropewalk::walker::{Encounter, Events, Walker};
+use ropewalk::walker::{Crossed, CrossingFilter, Encounter, Events, Walker};
 use std::ops::Range;
 
 /// Particles of a task.
@@ -49,6 +50,32 @@ pub fn cells_of<'py>(
     Ok(cells.into_pyarray(py))
 }
 
+/// Masks of particles and meshes, and the sides that are met.
+struct Met<'a> {
+    core: &'a Core,
+    /// Number of the first particle.
+    first: usize,
+    /// One for all particles or one a particle.
+    masks: Option<&'a [u32]>,
+    sides: Sides,
+}
+
+impl CrossingFilter for Met<'_> {
+    #[inline]
+    fn accepts(&self, particle: usize, crossed: &Crossed) -> bool {
+        let side = match self.sides {
+            Sides::Both => true,
+            Sides::Front => crossed.entering,
+            Sides::Back => !crossed.entering,
+        };
+        side && self.masks.is_none_or(|masks| {
+            // An altered file may name primitives that are not there.
+            let mesh = self.core.masks.get(mesh(self.core.first_primitives(), crossed.prim_id));
+            rays::one(masks, self.first + particle) & mesh.copied().unwrap_or(!0) != 0
+        })
+    }
+}
+
 /// Where particles are and at which triangles they were stopped, afterwards.
 type State<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>);
 
@@ -62,9 +89,24 @@ type Rows<'py> = (
     Bound<'py, PyArray1<bool>>,
 );
 
+/// Positions of particles, and the triangles at which they were stopped.
+type Walked = (Vec<[f32; 3]>, Vec<u32>);
+
+/// Row starts, directions and lengths of segments, and what is done at a triangle.
+type Segments<'a> = (&'a [usize], &'a [[f32; 3]], &'a [f32], Encounter);
+
+fn moved<F: CrossingFilter>(
+    mut walker: Walker<'_, F>,
+    (rows, directions, lengths, encounter): Segments<'_>,
+) -> (Walked, Events) {
+    let events = walker.run(rows, directions, lengths, encounter);
+    ((walker.positions().to_vec(), walker.stopped_at().to_vec()), events)
+}
+
 /// Moves particles along their rows of segments: their state, events, segments begun, and how many have
 /// no end.
 #[pyfunction]
+#[pyo3(signature = (core, positions, stopped, offsets, directions, lengths, stop, threads, masks=None, faces="both"))]
 pub fn walk<'py>(
     py: Python<'py>,
     core: &Core,
@@ -75,6 +117,8 @@ pub fn walk<'py>(
     lengths: PyReadonlyArray1<'_, f32>,
     stop: bool,
     threads: usize,
+    masks: Option<PyReadonlyArray1<'_, u32>>,
+    faces: &str,
 ) -> PyResult<(State<'py>, Rows<'py>, Bound<'py, PyArray1<i32>>, usize)> {
     let (positions, _) = positions.as_slice()?.as_chunks::<3>();
     let (directions, _) = directions.as_slice()?.as_chunks::<3>();
@@ -87,8 +131,10 @@ pub fn walk<'py>(
         && offsets.is_sorted()
         && offsets[n] <= lengths.len()
         && directions.len() == lengths.len();
-    if !fits {
-        let reason = "rows, directions and lengths do not fit each other";
+    let sides = rays::sides(faces)?;
+    let masks = masks.as_ref().map(|masks| masks.as_slice()).transpose()?;
+    if !fits || masks.is_some_and(|masks| masks.len() != 1 && masks.len() != n) {
+        let reason = "rows, directions, lengths and masks do not fit each other";
         return Err(error::argument("offsets", None, reason.into()));
     }
     let triangles = "the scene holds other primitives than triangles, which a Walker does not know";
@@ -97,15 +143,20 @@ pub fn walk<'py>(
     }
     let encounter = if stop { Encounter::Stop } else { Encounter::Pass };
     let tasks: Vec<Range<usize>> = blocks(n, block(n, threads, PARTICLES)).collect();
-    let run = |part: Range<usize>| -> Option<(Walker<'_>, Events)> {
+    let masks = masks_that_refuse(&core.masks, masks, &(0..n));
+    let is_plain = masks.is_none() && sides == Sides::Both;
+    let run = |part: Range<usize>| -> Option<(Walked, Events)> {
         let here = positions[part.clone()].to_vec();
         let walker = Walker::new(core.tree(), core.geometry(), here).ok()?;
-        let mut walker = walker.with_threads(1).with_stopped(stopped[part.clone()].to_vec());
-        let rows = &offsets[part.start..=part.end];
-        let events = walker.run(rows, directions, lengths, encounter);
-        Some((walker, events))
+        let walker = walker.with_threads(1).with_stopped(stopped[part.clone()].to_vec());
+        let segments = (&offsets[part.start..=part.end], directions, lengths, encounter);
+        Some(if is_plain {
+            moved(walker, segments)
+        } else {
+            moved(walker.with_filter(Met { core, first: part.start, masks, sides }), segments)
+        })
     };
-    let parts: Option<Vec<(Walker<'_>, Events)>> =
+    let parts: Option<Vec<(Walked, Events)>> =
         work::for_each(py, threads, tasks, run)?.into_iter().collect();
     let parts = parts.ok_or_else(|| error::argument("scene", None, triangles.into()))?;
 
@@ -117,9 +168,9 @@ pub fn walk<'py>(
     let (mut segment, mut t) = (zeros::<i32>(0)?, zeros::<f32>(0)?);
     let (mut prim, mut geom) = (zeros::<i32>(0)?, zeros::<i32>(found)?);
     let (mut entering, mut invalid, mut particle) = (vec![], 0, 0);
-    for (walker, events) in &parts {
-        at.extend_from_slice(walker.positions().as_flattened());
-        on.extend_from_slice(walker.stopped_at());
+    for ((positions, stopped), events) in &parts {
+        at.extend_from_slice(positions.as_flattened());
+        on.extend_from_slice(stopped);
         for &end in &events.offsets[1..] {
             particle += 1;
             rows[particle] = (t.len() + end) as i64;

@@ -4,6 +4,7 @@ use crate::error;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use ropewalk::build::Monitor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
@@ -99,6 +100,33 @@ pub fn watch<R: Send>(
     }
 }
 
+/// Tells work of the core that it is to stop.
+pub struct Stop<'a>(&'a AtomicBool);
+
+impl Monitor for Stop<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// What `work` returns, on a thread of its own, so that this one can hear signals.
+///
+/// # Errors
+/// The exception of a signal, once the work has stopped, or what [`error::panic`] makes of a panic.
+pub fn alone<R: Send>(py: Python<'_>, work: impl FnOnce(&Stop<'_>) -> R + Send) -> PyResult<R> {
+    let stop = AtomicBool::new(false);
+    watch(py, 1, &stop, |_| Ok(()), || work(&Stop(&stop)))
+}
+
+/// The same on this thread, for short work: signals are heard when it is done.
+///
+/// # Errors
+/// What [`error::panic`] makes of a panic.
+pub fn here<R: Send>(py: Python<'_>, work: impl FnOnce(&Stop<'_>) -> R + Send) -> PyResult<R> {
+    let stop = AtomicBool::new(false);
+    py.detach(|| catch_unwind(AssertUnwindSafe(|| work(&Stop(&stop)))).map_err(error::panic))
+}
+
 /// What `work` makes of each task, in order: on this thread (1) or on a pool of so many.
 ///
 /// # Errors
@@ -110,7 +138,7 @@ pub fn for_each<T: Send, R: Send>(
     work: impl Fn(T) -> R + Sync,
 ) -> PyResult<Vec<R>> {
     if threads == 1 || tasks.len() <= 1 {
-        return here(py, tasks, &work);
+        return in_turn(py, tasks, &work);
     }
     let stop = AtomicBool::new(false);
     let done = watch(
@@ -126,7 +154,7 @@ pub fn for_each<T: Send, R: Send>(
     done.ok_or_else(|| error::other("the query was stopped".into()))
 }
 
-fn here<T: Send, R: Send>(
+fn in_turn<T: Send, R: Send>(
     py: Python<'_>,
     tasks: Vec<T>,
     work: &(impl Fn(T) -> R + Sync),

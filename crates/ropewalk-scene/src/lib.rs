@@ -14,10 +14,11 @@ pub mod nff;
 mod sink;
 mod source;
 pub mod spd;
+mod watched;
 
 pub use file::write_atomically;
 pub use mesh::{Mesh, MeshError, MeshFormat, MeshLimits};
 pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, SceneSink, Surface};
 pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};
 pub use nff::{format_g, read_nff};
-pub use source::{Fault, Loaded, SceneError, load, load_scene, parse_builtin};
+pub use source::{Fault, Loaded, SceneError, load, load_monitored, load_scene, parse_builtin};

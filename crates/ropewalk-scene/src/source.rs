@@ -4,7 +4,9 @@ use crate::mesh::{Mesh, MeshError, MeshErrorKind, MeshFormat, MeshLimits};
 use crate::model::{Material, Object, Scene, Surface};
 use crate::nff::{NffError, NffLimits};
 use crate::spd::{self, Spd, SpdError};
+use crate::watched;
 use flate2::bufread::MultiGzDecoder;
+use ropewalk::build::Monitor;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader};
 use std::path::Path;
@@ -164,12 +166,24 @@ impl Loaded {
 /// # Errors
 /// [`SceneError`]; errors in a file carry its name and the place in it.
 pub fn load(spec: &str, limits: &NffLimits) -> Result<Loaded, SceneError> {
+    load_monitored(spec, limits, &())
+}
+
+/// The same, until the monitor cancels the reading of a file.
+///
+/// # Errors
+/// Those of [`load`], and an error of the file that says so.
+pub fn load_monitored(
+    spec: &str,
+    limits: &NffLimits,
+    monitor: &dyn Monitor,
+) -> Result<Loaded, SceneError> {
     if let Some((spd, size)) = parse_builtin(spec)? {
         return load_builtin(spec, spd, size, limits).map(Loaded::Scene);
     }
     match MeshFormat::of_name(Path::new(spec)) {
-        Some(format) => load_mesh(spec, format),
-        None => load_file(spec, limits).map(Loaded::Scene),
+        Some(format) => load_mesh(spec, format, monitor),
+        None => load_file(spec, limits, monitor).map(Loaded::Scene),
     }
 }
 
@@ -181,18 +195,21 @@ pub fn load_scene(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
     load(spec, limits).map(Loaded::into_scene)
 }
 
-fn load_mesh(spec: &str, format: MeshFormat) -> Result<Loaded, SceneError> {
+fn load_mesh(spec: &str, format: MeshFormat, monitor: &dyn Monitor) -> Result<Loaded, SceneError> {
     let path = Path::new(spec);
     if path.is_dir() {
         return Err(SceneError::Directory { path: spec.to_owned() });
     }
     let cannot_open = |source| SceneError::Open { path: spec.to_owned(), source };
-    let bytes = std::fs::read(path).map_err(cannot_open)?;
+    let file = File::open(path).map_err(cannot_open)?;
+    let cancelled = |error| SceneError::Mesh(MeshError::from(error).in_file(spec));
+    let bytes = watched::read_file(file, monitor).map_err(cannot_open)?.map_err(cancelled)?;
     let named_gzip = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     if named_gzip && !bytes.starts_with(&GZIP_MAGIC) {
         return Err(SceneError::NotGzip { path: spec.to_owned() });
     }
-    let mesh = Mesh::parse(format, &bytes, path.parent(), &MeshLimits::DEFAULT);
+    let limits = &MeshLimits::DEFAULT;
+    let mesh = Mesh::parse_monitored(format, &bytes, path.parent(), limits, monitor);
     Ok(Loaded::Mesh(stem(path), mesh.map_err(|error| error.in_file(spec))?))
 }
 
@@ -237,7 +254,7 @@ fn load_builtin(spec: &str, spd: Spd, size: u32, limits: &NffLimits) -> Result<S
     }
 }
 
-fn load_file(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
+fn load_file(spec: &str, limits: &NffLimits, monitor: &dyn Monitor) -> Result<Scene, SceneError> {
     let path = Path::new(spec);
     let cannot_open = |source| SceneError::Open { path: spec.to_owned(), source };
     if path.is_dir() {
@@ -249,11 +266,11 @@ fn load_file(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
     let named_gzip = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let scene = if is_gzip {
         let text = BufReader::with_capacity(BUFFER_BYTES, MultiGzDecoder::new(input));
-        Scene::read_nff(text, limits)
+        Scene::read_nff(watched::Text { input: text, monitor }, limits)
     } else if named_gzip {
         return Err(SceneError::NotGzip { path: spec.to_owned() });
     } else {
-        Scene::read_nff(input, limits)
+        Scene::read_nff(watched::Text { input, monitor }, limits)
     };
     let mut scene = scene.map_err(|error| error.in_file(spec))?;
     scene.name = stem(path);

@@ -1,5 +1,6 @@
 //! What can be wrong with a mesh file, and where.
 
+use crate::watched::Cancelled;
 use std::fmt;
 use std::io;
 
@@ -55,6 +56,9 @@ pub enum MeshErrorKind {
         /// What is there, shortened.
         found: String,
     },
+    /// The monitor cancelled it.
+    #[error("reading was cancelled")]
+    Cancelled,
     /// The system, or a damaged archive.
     #[error("{0}")]
     Io(io::Error),
@@ -74,6 +78,12 @@ impl MeshError {
 impl From<io::Error> for MeshError {
     fn from(error: io::Error) -> Self {
         MeshError { file: "input".into(), place: Place::Start, kind: MeshErrorKind::Io(error) }
+    }
+}
+
+impl From<Cancelled> for MeshError {
+    fn from(_: Cancelled) -> Self {
+        MeshError { file: "input".into(), place: Place::Start, kind: MeshErrorKind::Cancelled }
     }
 }
 

@@ -5,7 +5,7 @@
 //! bound checked.
 
 use super::error::{Place, Result, wrong};
-use super::{MeshError, MeshLimits, Soup};
+use super::{MeshError, Soup, Watched};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
@@ -25,7 +25,7 @@ type Matrix = [[f64; 4]; 3];
 const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// Vertices and faces.
-pub fn parse(bytes: &[u8], folder: Option<&Path>, limits: &MeshLimits) -> Result<Soup> {
+pub fn parse(bytes: &[u8], folder: Option<&Path>, limits: &Watched<'_>) -> Result<Soup> {
     let (json, bin) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let json: Value = serde_json::from_slice(json)
         .map_err(|e| wrong(Place::Line(e.line() as u64), "a glTF file: binary, or JSON text", e))?;
@@ -91,7 +91,7 @@ struct Reader<'a> {
     /// Bytes that buffers may still take.
     left: u64,
     soup: Soup,
-    limits: &'a MeshLimits,
+    limits: &'a Watched<'a>,
 }
 
 fn part(name: impl Into<String>) -> Place {

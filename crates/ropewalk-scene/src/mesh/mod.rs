@@ -14,9 +14,12 @@ mod text;
 
 pub use error::{MeshError, MeshErrorKind, Place};
 
+use crate::watched::{self, Cancelled};
 use error::{Result, wrong};
 use flate2::bufread::MultiGzDecoder;
-use std::io::Read;
+use ropewalk::build::Monitor;
+use std::fs::File;
+use std::ops::Deref;
 use std::path::Path;
 
 /// The first bytes of every gzip file.
@@ -109,6 +112,14 @@ impl Mesh {
     /// # Errors
     /// [`MeshError`] with the file's name: what was expected where, and what was found.
     pub fn read(path: &Path, limits: &MeshLimits) -> Result<Mesh> {
+        Mesh::read_monitored(path, limits, &())
+    }
+
+    /// The same, until the monitor cancels it.
+    ///
+    /// # Errors
+    /// As [`Mesh::read`], and [`MeshErrorKind::Cancelled`].
+    pub fn read_monitored(path: &Path, limits: &MeshLimits, monitor: &dyn Monitor) -> Result<Mesh> {
         let name = path.display().to_string();
         let read = || {
             let format = MeshFormat::of_name(path).ok_or_else(|| {
@@ -118,8 +129,8 @@ impl Mesh {
                     "none",
                 )
             })?;
-            let bytes = std::fs::read(path)?;
-            Mesh::parse(format, &bytes, path.parent(), limits)
+            let bytes = watched::read_file(File::open(path)?, monitor)??;
+            Mesh::parse_monitored(format, &bytes, path.parent(), limits, monitor)
         };
         read().map_err(|error| error.in_file(name))
     }
@@ -134,10 +145,26 @@ impl Mesh {
         folder: Option<&Path>,
         limits: &MeshLimits,
     ) -> Result<Mesh> {
+        Mesh::parse_monitored(format, bytes, folder, limits, &())
+    }
+
+    /// The same, until the monitor cancels it.
+    ///
+    /// # Errors
+    /// As [`Mesh::parse`], and [`MeshErrorKind::Cancelled`].
+    pub fn parse_monitored(
+        format: MeshFormat,
+        bytes: &[u8],
+        folder: Option<&Path>,
+        limits: &MeshLimits,
+        monitor: &dyn Monitor,
+    ) -> Result<Mesh> {
+        let limits = &Watched { limits, monitor };
         let mut plain = Vec::new();
         let bytes = if bytes.starts_with(&GZIP_MAGIC) {
             let limit = limits.bytes.saturating_add(1);
-            MultiGzDecoder::new(bytes).take(limit).read_to_end(&mut plain)?;
+            let decoder = std::io::Read::take(MultiGzDecoder::new(bytes), limit);
+            watched::read_to_end(decoder, &mut plain, monitor)??;
             &plain[..]
         } else {
             bytes
@@ -157,6 +184,32 @@ impl Mesh {
     }
 }
 
+/// Limits, and who may cancel the reading.
+struct Watched<'a> {
+    limits: &'a MeshLimits,
+    monitor: &'a dyn Monitor,
+}
+
+impl Deref for Watched<'_> {
+    type Target = MeshLimits;
+
+    fn deref(&self) -> &MeshLimits {
+        self.limits
+    }
+}
+
+/// Vertices or polygons that are read before the monitor is asked.
+const ASKED_EVERY: usize = 1 << 14;
+
+impl Watched<'_> {
+    /// Asks the monitor at every so many numbers.
+    #[inline(always)]
+    fn at(&self, number: usize) -> std::result::Result<(), Cancelled> {
+        let asks = number.is_multiple_of(ASKED_EVERY);
+        if asks && self.monitor.is_cancelled() { Err(Cancelled) } else { Ok(()) }
+    }
+}
+
 /// Vertices and polygons as a file states them.
 #[derive(Default)]
 struct Soup {
@@ -169,7 +222,8 @@ struct Soup {
 
 impl Soup {
     /// Adds a vertex, which must be finite.
-    fn vertex(&mut self, place: Place, point: [f64; 3], limits: &MeshLimits) -> Result<()> {
+    fn vertex(&mut self, place: Place, point: [f64; 3], limits: &Watched<'_>) -> Result<()> {
+        limits.at(self.vertices.len())?;
         if let Some(x) = point.iter().find(|&&x| !(x as f32).is_finite()) {
             let count = self.vertices.len();
             let what = format!("a finite coordinate within f32 for vertex {count}");
@@ -183,7 +237,8 @@ impl Soup {
     }
 
     /// Ends the polygon whose corners were pushed since the last one.
-    fn end_polygon(&mut self, place: Place, limits: &MeshLimits) -> Result<()> {
+    fn end_polygon(&mut self, place: Place, limits: &Watched<'_>) -> Result<()> {
+        limits.at(self.ends.len())?;
         let count = self.corners.len() - self.ends.last().copied().unwrap_or(0);
         if count < 3 {
             return Err(wrong(place, "a face of at least 3 corners", count));
@@ -203,7 +258,7 @@ impl Soup {
     }
 
     /// Cuts polygons into triangles. Corners must name vertices.
-    fn mesh(self, limits: &MeshLimits) -> Result<Mesh> {
+    fn mesh(self, limits: &Watched<'_>) -> Result<Mesh> {
         let Soup { vertices, corners, ends } = self;
         if ends.is_empty() {
             return Err(wrong(Place::End, "at least one face", "none"));
@@ -212,6 +267,7 @@ impl Soup {
         debug_assert!(triangles <= limits.faces);
         let (mut faces, mut start) = (Vec::with_capacity(triangles), 0);
         for (index, end) in ends.into_iter().enumerate() {
+            limits.at(index)?;
             match &corners[start..end] {
                 &[a, b, c] => faces.push([a, b, c]),
                 polygon => polygon::cut(&vertices, polygon, &mut faces).map_err(|most| {

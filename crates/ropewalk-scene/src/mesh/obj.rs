@@ -2,11 +2,11 @@
 
 use super::error::{Result, wrong};
 use super::text::{Words, parse as number, quote};
-use super::{MeshLimits, Soup};
+use super::{Soup, Watched};
 
 /// Vertices and faces. Colours and weights behind positions are ignored, as are texture and normal indices;
 /// negative indices count back from the last vertex so far.
-pub fn parse(bytes: &[u8], limits: &MeshLimits) -> Result<Soup> {
+pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
     // A backslash at the end of a line goes on with the next one.
     let joined: Vec<u8>;
     let is_joined =

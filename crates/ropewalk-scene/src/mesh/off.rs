@@ -2,10 +2,10 @@
 
 use super::error::{Place, Result, wrong};
 use super::text::{Words, quote};
-use super::{MeshLimits, Soup};
+use super::{Soup, Watched};
 
 /// Vertices and faces.
-pub fn parse(bytes: &[u8], limits: &MeshLimits) -> Result<Soup> {
+pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
     let mut words = Words::new(bytes, 1, Some(b'#'));
     let head = words.next().unwrap_or_default();
     let is_known = matches!(

@@ -2,7 +2,7 @@
 
 use super::error::{Place, Result, wrong};
 use super::text::{Words, parse as number, quote};
-use super::{MeshLimits, Soup};
+use super::{Soup, Watched};
 
 /// A scalar type of a property.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -132,7 +132,7 @@ impl Values<'_> {
 }
 
 /// Vertices and faces.
-pub fn parse(bytes: &[u8], limits: &MeshLimits) -> Result<Soup> {
+pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
     let mut words = Words::new(bytes, 1, None);
     let (form, elements) = header(&mut words)?;
     // The data begin behind the line of end_header.
@@ -264,7 +264,7 @@ fn read_one(
     values: &mut Values<'_>,
     vertices: u64,
     soup: &mut Soup,
-    limits: &MeshLimits,
+    limits: &Watched<'_>,
 ) -> Result<()> {
     let (mut point, mut is_vertex, place) = ([0.0; 3], false, values.place());
     for property in &element.properties {

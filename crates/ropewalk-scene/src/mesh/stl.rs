@@ -2,7 +2,7 @@
 
 use super::error::{Place, Result, wrong};
 use super::text::{Words, quote};
-use super::{MeshLimits, Soup};
+use super::{Soup, Watched};
 
 /// Header of a binary file, with the count.
 const HEADER: usize = 84;
@@ -11,7 +11,7 @@ const RECORD: usize = 50;
 
 /// Vertices and faces. A file is binary if it has the length that its header announces, whatever it begins
 /// with: some binary ones begin with `solid` too.
-pub fn parse(bytes: &[u8], limits: &MeshLimits) -> Result<Soup> {
+pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
     let announced = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let length = announced.map(|count| HEADER as u64 + RECORD as u64 * u64::from(count));
     if length == Some(bytes.len() as u64) {
@@ -31,7 +31,7 @@ pub fn parse(bytes: &[u8], limits: &MeshLimits) -> Result<Soup> {
     })
 }
 
-fn binary(bytes: &[u8], limits: &MeshLimits) -> Result<Soup> {
+fn binary(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
     let mut soup = Soup::default();
     for (i, record) in bytes[HEADER..].chunks_exact(RECORD).enumerate() {
         let place = Place::Byte((HEADER + i * RECORD) as u64);
@@ -48,7 +48,7 @@ fn binary(bytes: &[u8], limits: &MeshLimits) -> Result<Soup> {
     Ok(soup)
 }
 
-fn ascii(bytes: &[u8], limits: &MeshLimits) -> Result<Soup> {
+fn ascii(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
     let (mut soup, mut words) = (Soup::default(), Words::new(bytes, 1, None));
     // Corners of the loop that is open.
     let mut open: Option<usize> = None;

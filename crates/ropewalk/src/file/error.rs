@@ -83,6 +83,9 @@ pub enum FileError {
     /// This processor is big-endian.
     #[error("saved scenes are used as they lie, which needs a little-endian processor")]
     BigEndian,
+    /// The monitor cancelled it.
+    #[error("opening was cancelled")]
+    Cancelled,
 }
 
 fn advice(found: u32, expected: u32) -> &'static str {
@@ -120,6 +123,9 @@ pub enum WriteError {
     /// This processor is big-endian.
     #[error("scenes are saved as they lie, which needs a little-endian processor")]
     BigEndian,
+    /// The monitor cancelled it.
+    #[error("saving was cancelled")]
+    Cancelled,
     /// Bytes could not be written.
     #[error(transparent)]
     Io(#[from] std::io::Error),

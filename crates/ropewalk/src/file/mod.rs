@@ -20,10 +20,11 @@ pub use header::{
     FORMAT_VERSION, HEADER_BYTES, LAYOUT_VERSION, MAGIC, MAX_SECTIONS, SECTION_ALIGNMENT, Section,
     Tag,
 };
-pub use open::{AnyOpened, Check, Extra, Opened, OpenedDouble, open, open_any};
+pub use open::{AnyOpened, Check, Extra, Opened, OpenedDouble, open, open_any, open_monitored};
 pub use shapes::{ShapeRows, read_shapes, write_shapes};
-pub use write::{Contents, Primitives, Written, write};
+pub use write::{Contents, Primitives, Written, write, write_monitored};
 
+use crate::build::Monitor;
 use crate::geometry::Geometry;
 
 /// A hash of 32 bytes: BLAKE3.
@@ -44,8 +45,15 @@ pub fn triangles_hash(triangles: impl IntoIterator<Item = [[f32; 3]; 3]>) -> Has
 }
 
 /// The hash of a geometry in `f64`: of its vertices and faces as they were given.
-pub fn mesh_hash(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Hash {
-    write::mesh_hash(vertices, faces)
+///
+/// # Errors
+/// [`WriteError::Cancelled`] once the monitor says so.
+pub fn mesh_hash(
+    vertices: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    monitor: &dyn Monitor,
+) -> Result<Hash, WriteError> {
+    write::mesh_hash(vertices, faces, monitor)
 }
 
 /// A hash in hexadecimal, its first eight bytes.

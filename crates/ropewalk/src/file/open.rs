@@ -6,6 +6,8 @@ use super::figures::Figures;
 use super::header::{Header, SECTION_ALIGNMENT, Section, Tag, compare};
 use super::links::Links;
 use super::shapes::read_shapes;
+use super::write::PIECE;
+use crate::build::Monitor;
 use crate::double::{DoubleGeometry, DoubleTree, Rows};
 use crate::geometry::{Geometry, StoredTriangles};
 use crate::kernel::{Memory, SharedBytes};
@@ -80,6 +82,18 @@ pub fn open(bytes: &SharedBytes, check: Check) -> Result<Opened, FileError> {
 /// # Errors
 /// [`FileError`] with the part of the file, the offset, and what was expected there.
 pub fn open_any(bytes: &SharedBytes, check: Check) -> Result<AnyOpened, FileError> {
+    open_monitored(bytes, check, &())
+}
+
+/// [`open_any`] until the monitor cancels it: checksums take as long as the bytes take to read.
+///
+/// # Errors
+/// As there, and [`FileError::Cancelled`].
+pub fn open_monitored(
+    bytes: &SharedBytes,
+    check: Check,
+    monitor: &dyn Monitor,
+) -> Result<AnyOpened, FileError> {
     if cfg!(target_endian = "big") {
         return Err(FileError::BigEndian);
     }
@@ -90,8 +104,14 @@ pub fn open_any(bytes: &SharedBytes, check: Check) -> Result<AnyOpened, FileErro
     let header = Header::parse(all)?;
     if check == Check::Everything {
         for section in &header.sections {
-            let found = blake3::hash(&all[section.range()]);
-            let part = Part::Section(section.tag);
+            let mut hasher = blake3::Hasher::new();
+            for piece in all[section.range()].chunks(PIECE) {
+                if monitor.is_cancelled() {
+                    return Err(FileError::Cancelled);
+                }
+                hasher.update(piece);
+            }
+            let (found, part) = (hasher.finalize(), Part::Section(section.tag));
             compare(part, section.offset, &section.checksum, found.as_bytes())?;
         }
     }

@@ -7,6 +7,7 @@ use super::header::{
 };
 use super::shapes::write_shapes;
 use super::{Extra, Hash};
+use crate::build::Monitor;
 use crate::double::{DoubleGeometry, DoubleTree};
 use crate::geometry::{BACK, FRONT, Geometry, TRIANGLE_BYTES};
 use crate::primitive::Sides;
@@ -61,6 +62,9 @@ pub struct Written {
 /// Triangles that are made into bytes at once.
 const CHUNK: usize = 1 << 12;
 
+/// Bytes that are hashed or written before the monitor is asked: some milliseconds.
+pub const PIECE: usize = 1 << 22;
+
 /// The bytes of a section.
 enum Source<'a> {
     Bytes(Cow<'a, [u8]>),
@@ -75,10 +79,18 @@ impl Source<'_> {
         }
     }
 
-    /// Hands the bytes to `put`, piece by piece.
-    fn each(&self, mut put: impl FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
+    /// Hands the bytes to `put`, piece by piece, until the monitor cancels it.
+    fn each(
+        &self,
+        monitor: &dyn Monitor,
+        mut put: impl FnMut(&[u8]) -> io::Result<()>,
+    ) -> Result<(), WriteError> {
+        let mut put = |bytes: &[u8]| match monitor.is_cancelled() {
+            true => Err(WriteError::Cancelled),
+            false => Ok(put(bytes)?),
+        };
         match self {
-            Source::Bytes(bytes) => put(bytes),
+            Source::Bytes(bytes) => bytes.chunks(PIECE).try_for_each(put),
             Source::Triangles(geometry) => {
                 let mut rows = Vec::with_capacity(CHUNK);
                 for prim in 0..geometry.len() as u32 {
@@ -93,14 +105,13 @@ impl Source<'_> {
         }
     }
 
-    fn checksum(&self) -> Hash {
+    fn checksum(&self, monitor: &dyn Monitor) -> Result<Hash, WriteError> {
         let mut hasher = blake3::Hasher::new();
-        let hashed = self.each(|bytes| {
+        self.each(monitor, |bytes| {
             hasher.update(bytes);
             Ok(())
-        });
-        debug_assert!(hashed.is_ok(), "hashing does not fail");
-        *hasher.finalize().as_bytes()
+        })?;
+        Ok(*hasher.finalize().as_bytes())
     }
 }
 
@@ -157,17 +168,17 @@ fn more_double_sections(geometry: &DoubleGeometry) -> Vec<(Tag, Source<'_>)> {
 }
 
 /// Places sections one behind the other; the table.
-fn place(sources: &[(Tag, Source<'_>)]) -> Vec<Section> {
+fn place(sources: &[(Tag, Source<'_>)], monitor: &dyn Monitor) -> Result<Vec<Section>, WriteError> {
     let mut end = prefix_bytes(sources.len()) as u64;
     let place = |(tag, source): &(Tag, Source<'_>)| {
         let section = Section {
             tag: *tag,
             offset: aligned(end),
             len: source.len(),
-            checksum: source.checksum(),
+            checksum: source.checksum(monitor)?,
         };
         end = section.offset + section.len;
-        section
+        Ok(section)
     };
     sources.iter().map(place).collect()
 }
@@ -179,6 +190,18 @@ fn place(sources: &[(Tag, Source<'_>)]) -> Vec<Section> {
 /// # Errors
 /// [`WriteError::Custom`] for primitives of users' own kinds, [`WriteError::Io`] for what `out` says.
 pub fn write(contents: &Contents<'_>, out: &mut impl Write) -> Result<Written, WriteError> {
+    write_monitored(contents, out, &())
+}
+
+/// The same, until the monitor cancels it; it is asked every few milliseconds.
+///
+/// # Errors
+/// As [`write()`], and [`WriteError::Cancelled`].
+pub fn write_monitored(
+    contents: &Contents<'_>,
+    out: &mut impl Write,
+    monitor: &dyn Monitor,
+) -> Result<Written, WriteError> {
     little_endian()?;
     let Contents { tree, geometry, figures, extra } = contents;
     let mut sources = vec![(Tag::TREE, Source::Bytes(tree.lines().bytes().into()))];
@@ -204,7 +227,7 @@ pub fn write(contents: &Contents<'_>, out: &mut impl Write) -> Result<Written, W
     };
     sources.extend(figures.map(|f| (Tag::FIGURES, Source::Bytes(f.to_bytes().into()))));
     sources.extend(extra.iter().map(|e| (e.tag, Source::Bytes(e.bytes[..].into()))));
-    let sections = place(&sources);
+    let sections = place(&sources, monitor)?;
     let header = Header {
         geometry_hash: hash_of(&sections[of_geometry]),
         tree_bounds: *tree.bounds(),
@@ -222,7 +245,7 @@ pub fn write(contents: &Contents<'_>, out: &mut impl Write) -> Result<Written, W
     let mut end = prefix.len() as u64;
     for ((_, source), section) in sources.iter().zip(&header.sections) {
         pad(out, end)?;
-        source.each(|bytes| out.write_all(bytes))?;
+        source.each(monitor, |bytes| out.write_all(bytes))?;
         end = section.offset + section.len;
     }
     pad(out, end)?;
@@ -240,11 +263,15 @@ fn little_endian() -> Result<(), WriteError> {
 
 pub fn geometry_hash(geometry: &Geometry) -> Result<Hash, WriteError> {
     little_endian()?;
-    Ok(hash_of(&place(&geometry_sections(geometry)?)))
+    Ok(hash_of(&place(&geometry_sections(geometry)?, &())?))
 }
 
-pub fn mesh_hash(vertices: &[[f64; 3]], faces: &[[u32; 3]]) -> Hash {
-    hash_of(&place(&mesh_sections(vertices, faces)))
+pub fn mesh_hash(
+    vertices: &[[f64; 3]],
+    faces: &[[u32; 3]],
+    monitor: &dyn Monitor,
+) -> Result<Hash, WriteError> {
+    Ok(hash_of(&place(&mesh_sections(vertices, faces), monitor)?))
 }
 
 pub fn triangles_hash(triangles: impl IntoIterator<Item = [[f32; 3]; 3]>) -> Hash {

@@ -1,6 +1,6 @@
 //! Particles with lists of segments, as the lanes of a wave take them.
 
-use super::{Crossed, Crossings, Encounter, end_of};
+use super::{Crossed, CrossingFilter, Crossings, Encounter, end_of};
 use crate::kernel::{Before, Crowd, WAVE};
 use crate::ray::Ray;
 
@@ -18,7 +18,7 @@ pub struct Record {
 }
 
 /// The particles of a task.
-pub struct Lists<'a> {
+pub struct Lists<'a, F> {
     /// Where the segments of each particle begin, and where the last ones end.
     offsets: &'a [usize],
     directions: &'a [[f32; 3]],
@@ -28,6 +28,10 @@ pub struct Lists<'a> {
     /// Segments that each particle has behind it.
     walked: &'a mut [u32],
     encounter: Encounter,
+    /// Decides which crossings count.
+    filter: &'a F,
+    /// The index of the first particle among all, as the filter knows them.
+    first: usize,
     /// The particle of each lane.
     of: [usize; WAVE],
     /// Where its segment ends.
@@ -45,13 +49,14 @@ type State<'a> = (&'a mut [[f32; 3]], &'a mut [u32], &'a mut [u32]);
 /// errors for a ray of exact direction; this one's is rounded, which moves parameters by less.
 const BEYOND: f32 = 1.0 / (1u32 << 16) as f32;
 
-impl<'a> Lists<'a> {
-    /// Particles with their rows of segments.
+impl<'a, F: CrossingFilter> Lists<'a, F> {
+    /// Particles with their rows of segments, the first of which is number `first` of all.
     pub fn new(
         offsets: &'a [usize],
         (directions, lengths): (&'a [[f32; 3]], &'a [f32]),
         (positions, stopped, walked): State<'a>,
         encounter: Encounter,
+        (filter, first): (&'a F, usize),
     ) -> Self {
         Lists {
             offsets,
@@ -61,6 +66,8 @@ impl<'a> Lists<'a> {
             stopped,
             walked,
             encounter,
+            filter,
+            first,
             of: [usize::MAX; WAVE],
             to: [[0.0; 3]; WAVE],
             next: 0,
@@ -88,7 +95,9 @@ impl<'a> Lists<'a> {
         let passed = std::mem::replace(&mut self.stopped[particle], u32::MAX);
         self.walked[particle] += 1;
         self.positions[particle] = to;
-        for hit in crossed.iter().filter(|hit| hit.prim_id != passed) {
+        let (filter, index) = (self.filter, self.first + particle);
+        let counts = |hit: &&Crossed| hit.prim_id != passed && filter.accepts(index, hit);
+        for hit in crossed.iter().filter(counts) {
             let length = self.lengths[self.offsets[particle] + segment as usize];
             let t = (hit.share * f64::from(length)) as f32;
             self.records.push(Record { particle: particle as u32, segment, t, hit: *hit });
@@ -132,7 +141,7 @@ impl<'a> Lists<'a> {
     }
 }
 
-impl Crowd<Crossings> for Lists<'_> {
+impl<F: CrossingFilter> Crowd<Crossings> for Lists<'_, F> {
     #[inline(always)]
     fn advance(&mut self, k: usize, query: &mut Crossings, before: Before) -> Option<Ray> {
         let goes_on = match before {

@@ -15,7 +15,7 @@ pub use crossing::Crossed;
 pub(crate) use crossing::crossing;
 
 use crate::geometry::Geometry;
-use crate::kernel::{BatchCaster, Crossings, Lanes, Level, WAVE, WalkReport};
+use crate::kernel::{BatchCaster, Crossings, Lanes, Level, Masks, NoFilter, WAVE, WalkReport};
 use crate::point::cells::locate;
 use crate::point::{Cell, PointError};
 use crate::primitive::{Primitive, Shape};
@@ -58,6 +58,35 @@ pub struct Events {
     pub report: WalkReport,
 }
 
+/// Decides which crossings count: what it refuses is no event and stops no particle.
+///
+/// It may be asked from several threads: its answer must depend on its arguments alone.
+pub trait CrossingFilter: Sync {
+    /// True if the crossing counts for the particle with this index.
+    fn accepts(&self, particle: usize, crossed: &Crossed) -> bool;
+}
+
+/// Every crossing counts.
+impl CrossingFilter for NoFilter {
+    #[inline(always)]
+    fn accepts(&self, _particle: usize, _crossed: &Crossed) -> bool {
+        true
+    }
+}
+
+/// A crossing counts where the masks of triangle and particle (`ray`) have a bit in common.
+impl CrossingFilter for Masks<'_> {
+    fn accepts(&self, particle: usize, crossed: &Crossed) -> bool {
+        self.match_up(particle, crossed.prim_id)
+    }
+}
+
+impl<F: Fn(usize, &Crossed) -> bool + Sync> CrossingFilter for F {
+    fn accepts(&self, particle: usize, crossed: &Crossed) -> bool {
+        self(particle, crossed)
+    }
+}
+
 /// Largest coordinate of a particle.
 pub const LARGEST: f32 = 1e30;
 
@@ -97,8 +126,9 @@ pub fn end_of(from: [f32; 3], direction: [f32; 3], length: f32) -> Option<[f32; 
 ///
 /// A particle that is stopped stands where the segment crosses the triangle, rounded, and its next segment
 /// passes this triangle without a further event, to either side.
-pub struct Walker<'a> {
+pub struct Walker<'a, F = NoFilter> {
     caster: BatchCaster<'a>,
+    filter: F,
     tree: &'a WideTree,
     positions: Vec<[f32; 3]>,
     /// The triangle at which each particle was stopped, which its next segment passes; `u32::MAX` for
@@ -121,7 +151,17 @@ impl<'a> Walker<'a> {
             return Err(PointError::NotTriangles);
         }
         let stopped = vec![u32::MAX; positions.len()];
-        Ok(Walker { caster: BatchCaster::new(tree, geometry), tree, positions, stopped })
+        let caster = BatchCaster::new(tree, geometry);
+        Ok(Walker { caster, filter: NoFilter, tree, positions, stopped })
+    }
+}
+
+impl<'a, F: CrossingFilter> Walker<'a, F> {
+    /// The same with a filter that decides which crossings count: a closure of the particle's index and the
+    /// crossing, or [`Masks`].
+    pub fn with_filter<G: CrossingFilter>(self, filter: G) -> Walker<'a, G> {
+        let Walker { caster, tree, positions, stopped, .. } = self;
+        Walker { caster, filter, tree, positions, stopped }
     }
 
     /// The same with another level, or `None` if this machine lacks it.
@@ -207,16 +247,17 @@ impl<'a> Walker<'a> {
         let mut walked = vec![0u32; n];
         let serial = self.caster.threads() == 1 || n <= TASK;
         let task = if serial { n.max(1) } else { TASK };
-        let caster = self.caster;
+        let (caster, filter) = (self.caster, &self.filter);
         let parts = self.positions.chunks_mut(task).zip(self.stopped.chunks_mut(task));
         let parts = parts.zip(walked.chunks_mut(task)).enumerate();
-        let tasks: Vec<Lists<'_>> = parts
+        let tasks: Vec<Lists<'_, F>> = parts
             .map(|(i, ((positions, stopped), walked))| {
                 let rows = &offsets[i * task..=i * task + positions.len()];
-                Lists::new(rows, (directions, lengths), (positions, stopped, walked), encounter)
+                let state = (positions, stopped, walked);
+                Lists::new(rows, (directions, lengths), state, encounter, (filter, i * task))
             })
             .collect();
-        let run = |lists: Lists<'_>| {
+        let run = |lists: Lists<'_, F>| {
             let width = lists.len().min(WAVE);
             let mut lanes = Lanes::new(caster.tree(), width, lists);
             caster.run_lanes(width, &mut Crossings::new(), &mut lanes);

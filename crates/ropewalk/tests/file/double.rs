@@ -84,7 +84,7 @@ fn every_answer_and_every_byte() {
         assert_eq!(scene.bytes, bytes.len() as u64);
         assert_eq!(scene.geometry.bounds(), ready.geometry.bounds());
         assert_eq!(scene.geometry.degenerate(), [triangles]);
-        let hash = mesh_hash(ready.geometry.vertices(), ready.geometry.faces());
+        let hash = mesh_hash(ready.geometry.vertices(), ready.geometry.faces(), &()).unwrap();
         assert_eq!(scene.geometry_hash, hash);
         let before = answers(&ready.tree, &ready.geometry, &scene);
         assert_eq!(answers(&scene.tree, &scene.geometry, &scene), before);

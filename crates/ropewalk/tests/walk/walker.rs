@@ -2,7 +2,7 @@
 
 use crate::bench::{Bench, coordinates};
 use crate::scenes;
-use ropewalk::kernel::{Arrival, BatchCaster, Level, Particle};
+use ropewalk::kernel::{Arrival, BatchCaster, Level, Masks, Particle};
 use ropewalk::point::{PointQueries, Side};
 use ropewalk::primitive::Triangle;
 use ropewalk::walker::{Crossed, Encounter, Events, Walker, crossings, end_of};
@@ -75,7 +75,13 @@ fn crowd(draw: &mut Draw, bounds: &Aabb, values: &[Vec<f32>; 3], particles: usiz
 /// What a particle meets, by the definition: events, the end, segments begun, and where it was stopped.
 type Walked = (Vec<(u32, f32, u32, bool)>, [f32; 3], u32, u32);
 
-fn expected(geometry: &Geometry, crowd: &Crowd, i: usize, encounter: Encounter) -> Walked {
+fn expected(
+    geometry: &Geometry,
+    crowd: &Crowd,
+    i: usize,
+    encounter: Encounter,
+    filter: impl Fn(usize, &Crossed) -> bool,
+) -> Walked {
     let (mut at, mut stopped, mut events) = (crowd.positions[i], u32::MAX, Vec::new());
     let row = crowd.offsets[i]..crowd.offsets[i + 1];
     for (segment, s) in row.clone().enumerate() {
@@ -84,7 +90,7 @@ fn expected(geometry: &Geometry, crowd: &Crowd, i: usize, encounter: Encounter) 
             continue;
         }
         let met = crossings(geometry, at, to);
-        let mut met = met.iter().filter(|hit| hit.prim_id != stopped);
+        let mut met = met.iter().filter(|hit| hit.prim_id != stopped && filter(i, hit));
         let event = |hit: &Crossed| {
             let t = (hit.share * f64::from(crowd.lengths[s])) as f32;
             (segment as u32, t, hit.prim_id, hit.entering)
@@ -111,17 +117,23 @@ fn row(events: &Events, i: usize) -> Vec<(u32, f32, u32, bool)> {
         .collect()
 }
 
-/// Runs a crowd twice on end at every level and compares with the definition; the number of events.
-fn check(geometry: &Geometry, wide: &WideTree, crowd: &Crowd) -> usize {
+/// Runs a crowd at every level and compares with the definition; the number of events.
+fn check<F: Fn(usize, &Crossed) -> bool + Copy + Sync>(
+    geometry: &Geometry,
+    wide: &WideTree,
+    crowd: &Crowd,
+    filter: F,
+) -> usize {
     let mut met = 0;
     for encounter in [Encounter::Pass, Encounter::Stop] {
-        let first: Vec<Walked> =
-            (0..crowd.positions.len()).map(|i| expected(geometry, crowd, i, encounter)).collect();
+        let first: Vec<Walked> = (0..crowd.positions.len())
+            .map(|i| expected(geometry, crowd, i, encounter, filter))
+            .collect();
         for level in Level::ALL {
             for threads in [0, 1] {
                 let walker = Walker::new(wide, geometry, crowd.positions.clone()).unwrap();
                 let Some(walker) = walker.with_level(level) else { continue };
-                let mut walker = walker.with_threads(threads);
+                let mut walker = walker.with_filter(filter).with_threads(threads);
                 let events =
                     walker.run(&crowd.offsets, &crowd.directions, &crowd.lengths, encounter);
                 for (i, (list, end, walked, stopped)) in first.iter().enumerate() {
@@ -139,7 +151,7 @@ fn check(geometry: &Geometry, wide: &WideTree, crowd: &Crowd) -> usize {
 }
 
 fn each(seed: u64, scene: impl Fn(&mut Draw) -> Geometry) {
-    let mut met = 0;
+    let (mut met, mut filtered) = (0, 0);
     for round in 0..4 {
         let mut draw = Draw::new(seed + round);
         let geometry = scene(&mut draw);
@@ -148,9 +160,14 @@ fn each(seed: u64, scene: impl Fn(&mut Draw) -> Geometry) {
         let wide = WideTree::compile(&tree, &geometry).unwrap();
         let bench = Bench::new(geometry.clone().into(), tree.into());
         let crowd = crowd(&mut draw, &geometry.bounds(), &coordinates(&bench), 80);
-        met += check(&geometry, &wide, &crowd);
+        met += check(&geometry, &wide, &crowd, |_, _| true);
+        filtered += check(&geometry, &wide, &crowd, |particle, hit| {
+            hit.entering == (particle % 2 == 0)
+                && !(hit.prim_id as usize + particle).is_multiple_of(3)
+        });
     }
     assert!(met > 100, "{met} events");
+    assert!(0 < filtered && filtered < met, "{filtered} of {met} events");
 }
 
 #[test]
@@ -296,6 +313,24 @@ fn what_has_no_end_is_left_out_and_counted() {
     let events = walker.advance(&[x; 3], &[1.0; 3], Encounter::Stop);
     assert_eq!(events.offsets, [0; 4]);
     assert_eq!(walker.positions(), [x; 3]);
+}
+
+#[test]
+fn masks_are_those_of_each_particle_in_any_task() {
+    let mut geometry = Geometry::new();
+    push_box(&mut geometry, [0.0; 3], [1.0; 3]);
+    push_box(&mut geometry, [2.0, 0.0, 0.0], [3.0, 1.0, 1.0]);
+    let (wide, _) = WideTree::build(&geometry, &Default::default(), &()).unwrap();
+    let primitive: Vec<u32> = (0..24).map(|prim| 1 << (prim / 12)).collect();
+    let ray: Vec<u32> = (0..5000).collect();
+    let masks = Masks { primitive: &primitive, ray: &ray };
+    let walker = Walker::new(&wide, &geometry, vec![[-1.0, 0.25, 0.5]; 5000]).unwrap();
+    let mut walker = walker.with_filter(masks);
+    let events = walker.advance(&[[5.0, 0.0, 0.0]; 5000], &[1.0; 5000], Encounter::Stop);
+    for (i, at) in walker.positions().iter().enumerate() {
+        let (x, count) = [(4.0, 0), (0.0, 1), (2.0, 1), (0.0, 1)][i % 4];
+        assert_eq!((at[0], row(&events, i).len()), (x, count), "particle {i}");
+    }
 }
 
 /// A walk whose next segment depends on what the last one hit.

@@ -47,10 +47,17 @@ pub struct Masks<'a> {
     pub ray: &'a [u32],
 }
 
+impl Masks<'_> {
+    /// True if the masks of a ray and a primitive have a bit in common.
+    pub(crate) fn match_up(&self, ray: usize, prim_id: u32) -> bool {
+        let primitive = self.primitive.get(prim_id as usize).copied().unwrap_or(!0);
+        primitive & self.ray.get(ray).copied().unwrap_or(!0) != 0
+    }
+}
+
 impl HitFilter for Masks<'_> {
     fn accepts(&self, ray: usize, hit: &Hit) -> bool {
-        let primitive = self.primitive.get(hit.prim_id as usize).copied().unwrap_or(!0);
-        primitive & self.ray.get(ray).copied().unwrap_or(!0) != 0
+        self.match_up(ray, hit.prim_id)
     }
 }
 
