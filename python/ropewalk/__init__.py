@@ -12,7 +12,6 @@ number of threads and any processor.
 
 from importlib.metadata import version as _version
 
-import numpy as _np
 
 from ._errors import (
     ArgumentError,
@@ -35,14 +34,9 @@ from ._hits import HitLists, Hits
 from ._mesh import read_mesh
 from ._points import Cells, ClosestPoints
 from ._report import Report
-from ._ropewalk import Points as _Points
 from ._ropewalk import default_threads, simd_level
 from ._scene import Scene, load
 from ._walker import Events, Walker
-
-# The extension module looks up NumPy's C interface when it sees its first array, and Ctrl-C in the middle of that
-# would be a panic: so it sees one now.
-_Points.invalid(_np.zeros(0))
 
 __version__ = _version("ropewalk")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +32,10 @@ if TYPE_CHECKING:
 
 #: Up to so many rays are answered on the calling thread: waking others would take longer.
 _FEW_RAYS = 2048
+
+
+#: Origins and directions, and where rays end.
+RaySample = tuple[ArrayLike, ArrayLike] | tuple[ArrayLike, ArrayLike, ArrayLike]
 
 
 class RayMethods:
@@ -351,6 +356,44 @@ def _cells(start: Any, shape: tuple[int, ...]) -> NDArray[np.int64] | None:
     if cells.dtype == np.uint64:
         cells = np.minimum(cells, np.uint64(2**63 - 1))
     return np.ascontiguousarray(per_ray(cells, shape, "start"), np.int64)
+
+
+def as_sample(rays: RaySample | None, kind: Any, stacklevel: int) -> Any:
+    """The rays of a sample."""
+    if rays is None:
+        return None
+    if not isinstance(rays, (tuple, list)) or len(rays) not in (2, 3):
+        found = f"{len(rays)} of them" if isinstance(rays, (tuple, list)) else type(rays).__name__
+        raise ArgumentTypeError(
+            f"rays: expected a tuple (origins, directions) or (origins, directions, t_max), found {found}",
+            "rays",
+        )
+    o, d = as_points(rays[0], "rays[0]"), as_points(rays[1], "rays[1]")
+    try:
+        shape = np.broadcast_shapes(o.shape[:-1], d.shape[:-1])
+    except ValueError:
+        raise ArgumentError(
+            f"rays: expected origins and directions of shapes that fit, found {o.shape} and {d.shape}",
+            "rays",
+        ) from None
+    as_float = as_float64 if kind is DoubleRays else as_float32
+    t_max = per_ray(as_array(rays[2] if len(rays) == 3 else np.inf, "rays[2]"), shape, "rays[2]")
+    made = kind(
+        prod(shape),
+        _points(o, shape, as_float),
+        _points(d, shape, as_float),
+        as_float(np.zeros(1)),
+        as_float(t_max),
+    )
+    invalid, first = made.invalid()
+    if invalid:
+        warnings.warn(
+            f"rays: {invalid} rays have NaN or infinite numbers or no direction and are left out of the "
+            f"sample; the first is ray {first}",
+            InvalidRayWarning,
+            stacklevel=stacklevel,
+        )
+    return made
 
 
 def _points(

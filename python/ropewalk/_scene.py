@@ -6,7 +6,6 @@ import os
 import warnings
 from collections.abc import Callable, Iterable
 from contextlib import contextmanager
-from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,9 +26,9 @@ from ._errors import ArgumentError, ArgumentTypeError, PrecisionWarning
 from ._file import Saved
 from ._mesh import as_path
 from ._points import PointMethods
-from ._rays import RayMethods
+from ._rays import RayMethods, RaySample, as_sample
 from ._report import Report, plural, report_of, size_of
-from ._ropewalk import Core, DoubleCore, default_threads
+from ._ropewalk import Core, DoubleCore, DoubleRays, Rays, default_threads
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,9 +40,6 @@ if TYPE_CHECKING:
 _PRECISION = 2.0**-20
 
 _ALL_BITS = 0xFFFF_FFFF
-
-#: Origins and directions, and where rays end.
-RaySample = tuple[ArrayLike, ArrayLike] | tuple[ArrayLike, ArrayLike, ArrayLike]
 
 #: Coordinates in float64 beyond this would overflow in products.
 _LARGEST = 1e100
@@ -429,7 +425,7 @@ def load(
         )
     with _progress(progress) as show:
         limit, plan = as_limit(memory_limit), _plan(preset, cost_model)
-        sample = _sample(rays, Rays, stacklevel=3)
+        sample = as_sample(rays, Rays, stacklevel=3)
         core = Core.load(name, plan, as_threads(threads), show, limit, sample)
     scene = Scene.__new__(Scene)
     scene._adopt(core)
@@ -500,7 +496,7 @@ def _build(
                 PrecisionWarning,
                 stacklevel=4,
             )
-    faces, sample = [mesh[1] for mesh in meshes], _sample(rays, Rays, stacklevel=5)
+    faces, sample = [mesh[1] for mesh in meshes], as_sample(rays, Rays, stacklevel=5)
     with _progress(progress) as show:
         return Core.build(vertices, faces, masks, plan, threads, show, limit, sample)
 
@@ -535,7 +531,7 @@ def _build_double(
         raise ArgumentError(f"meshes: {first} vertices are too many; expected less than 2^32", "meshes")
     one = len(meshes) == 1
     joined = (vertices[0], faces[0]) if one else (np.concatenate(vertices), np.concatenate(faces))
-    sample = _sample(rays, DoubleRays, stacklevel=6)
+    sample = as_sample(rays, DoubleRays, stacklevel=6)
     with _progress(progress) as show:
         return DoubleCore.build(*joined, starts, masks, plan, threads, show, limit, sample)
 
@@ -546,45 +542,6 @@ def _plan(preset: str, cost_model: str) -> tuple[str, str]:
         if not isinstance(value, str):
             raise ArgumentTypeError(f"{name}: expected a string, found {type(value).__name__}", name)
     return preset, cost_model
-
-
-def _sample(rays: RaySample | None, kind: Any, stacklevel: int) -> Any:
-    """The rays of a sample."""
-    if rays is None:
-        return None
-    if not isinstance(rays, (tuple, list)) or len(rays) not in (2, 3):
-        found = f"{len(rays)} of them" if isinstance(rays, (tuple, list)) else type(rays).__name__
-        raise ArgumentTypeError(
-            f"rays: expected a tuple (origins, directions) or (origins, directions, t_max), found {found}",
-            "rays",
-        )
-    o, d = as_points(rays[0], "rays[0]"), as_points(rays[1], "rays[1]")
-    try:
-        shape = np.broadcast_shapes(o.shape[:-1], d.shape[:-1])
-    except ValueError:
-        raise ArgumentError(
-            f"rays: expected origins and directions of shapes that fit, found {o.shape} and {d.shape}",
-            "rays",
-        ) from None
-    as_float = as_float64 if kind is DoubleRays else as_float32
-    t_max = per_ray(as_array(rays[2] if len(rays) == 3 else np.inf, "rays[2]"), shape, "rays[2]")
-    made = kind(
-        prod(shape),
-        _points(o, shape, as_float),
-        _points(d, shape, as_float),
-        as_float(np.zeros(1)),
-        as_float(t_max),
-    )
-    invalid, first = made.invalid()
-    if invalid:
-        warnings.warn(
-            f"rays: {invalid} rays have NaN or infinite numbers or no direction and are left out of the "
-            f"sample; the first is ray {first}",
-            InvalidRayWarning,
-            stacklevel=stacklevel,
-        )
-    return made
-
 
 
 def _mesh(

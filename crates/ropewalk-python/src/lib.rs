@@ -42,6 +42,15 @@ mod _ropewalk {
     #[pymodule_export]
     use crate::walker::{cells_of, walk};
 
+    /// NumPy's C interface is looked up when the first array is seen, and Ctrl-C in the middle of that would be
+    /// a panic: so one is made here.
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.py().import("numpy")?;
+        numpy::PyArray1::<f64>::zeros(module.py(), 0, false);
+        Ok(())
+    }
+
     /// The SIMD level that queries use on this machine: scalar, avx2 or avx512.
     #[pyfunction]
     fn simd_level() -> &'static str {
