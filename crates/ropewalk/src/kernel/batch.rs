@@ -242,7 +242,7 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     pub fn closest_hit_one(&self, ray: &Ray) -> Option<Hit> {
         let leaves = self.leaves(ray);
         with_slot(|slot| {
-            let query = Closest::new(&mut [], &mut []);
+            let query = Closest::one();
             if !self.run_one(&leaves, slot, query) || slot.best_id == u32::MAX {
                 return None;
             }
@@ -367,7 +367,7 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     /// What the batch of [`BatchCaster::closest_hit_one`] does, counted.
     pub fn closest_hit_one_events(&self, ray: &Ray) -> BatchEvents {
         let (leaves, mut events) = (self.leaves(ray), BatchEvents::default());
-        let query = Closest::new(&mut [], &mut []);
+        let query = Closest::one();
         with_slot(|slot| self.run_one_counted(&leaves, slot, query, &mut events));
         events
     }

@@ -14,8 +14,14 @@ use crate::wide::{ID_MASK, WIDTH};
 pub struct Closest<'a> {
     pub(in crate::kernel) t: &'a mut [f32],
     pub(in crate::kernel) prim: &'a mut [u32],
-    /// Finished rays whose hit is known but not its exact parameter, and where it lies.
-    pending: [(Sheared, At); 2 * PENDING],
+    /// None for a ray by itself, which does not wait.
+    pending: Option<Box<Pending>>,
+}
+
+/// Finished rays whose hit is known but not its exact parameter.
+struct Pending {
+    /// The rays, and where their hits lie.
+    rays: [(Sheared, At); 2 * PENDING],
     count: usize,
     /// The same eight at a time; lanes that are not in use hold anything.
     pairs: [Pairs; 2 * PENDING / WIDTH],
@@ -30,13 +36,17 @@ const _: () = assert!(WAVE <= PENDING);
 impl<'a> Closest<'a> {
     /// Hits go to `t`, infinite for a miss, and `prim`, `u32::MAX` for a miss.
     pub fn new(t: &'a mut [f32], prim: &'a mut [u32]) -> Self {
-        Closest {
-            t,
-            prim,
-            pending: [(Sheared::default(), 0); 2 * PENDING],
+        let pending = Pending {
+            rays: [(Sheared::default(), 0); 2 * PENDING],
             count: 0,
             pairs: [Pairs::EMPTY; 2 * PENDING / WIDTH],
-        }
+        };
+        Closest { t, prim, pending: Some(Box::new(pending)) }
+    }
+
+    /// For one ray, whose slot has the answer: several KiB less to clear.
+    pub fn one() -> Closest<'static> {
+        Closest { t: &mut [], prim: &mut [], pending: None }
     }
 
     /// The answer to a ray, once it is settled.
@@ -63,11 +73,12 @@ impl<'a> Closest<'a> {
     /// As for [`BatchQuery::take_clear`].
     #[inline(always)]
     unsafe fn settle_pending<L: Simd>(&mut self, exact: &Exact<'_>) {
-        let pending = &self.pending[..std::mem::take(&mut self.count)];
+        let Some(Pending { rays, count, pairs }) = self.pending.as_deref_mut() else { return };
+        let pending = &rays[..std::mem::take(count)];
         for (i, (ray, at)) in pending.iter().enumerate() {
-            self.pairs[i / WIDTH].set(i, ray, exact.lines, *at);
+            pairs[i / WIDTH].set(i, ray, exact.lines, *at);
         }
-        for (pairs, pending) in self.pairs.iter().zip(pending.chunks(WIDTH)) {
+        for (pairs, pending) in pairs.iter().zip(pending.chunks(WIDTH)) {
             let mut t = [0.0; WIDTH];
             // SAFETY: passed on to the caller.
             let open = unsafe { pairs.meet::<L::Doubles>(&mut t) };
@@ -129,8 +140,10 @@ impl BatchQuery for Closest<'_> {
         let hit = slot.best_id != u32::MAX;
         self.t[slot.ray as usize] = if hit { slot.limit } else { f32::INFINITY };
         self.prim[slot.ray as usize] = slot.best_id;
-        self.pending[self.count % (2 * PENDING)] = (Sheared::new(slot, exact.rays), slot.best_at);
-        self.count += usize::from(slot.best_at != u32::MAX);
+        let Some(pending) = self.pending.as_deref_mut() else { return };
+        let at = pending.count % (2 * PENDING);
+        pending.rays[at] = (Sheared::new(slot, exact.rays), slot.best_at);
+        pending.count += usize::from(slot.best_at != u32::MAX);
     }
 
     fn miss(&mut self, index: usize) {
@@ -140,7 +153,8 @@ impl BatchQuery for Closest<'_> {
 
     #[inline(always)]
     unsafe fn settle<L: Simd>(&mut self, exact: &Exact<'_>, all: bool) {
-        if self.count >= PENDING || (all && self.count > 0) {
+        let count = self.pending.as_ref().map_or(0, |pending| pending.count);
+        if count >= PENDING || (all && count > 0) {
             // SAFETY: passed on to the caller.
             unsafe { self.settle_pending::<L>(exact) };
         }
