@@ -1,15 +1,16 @@
 //! Nanoseconds and counted events per ray of the batch kernels, without peers.
 //!
-//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START] [PRESETS]`, names separated by commas;
+//! `kernel_profile SCENES WORKLOADS [ROUNDS] [LEVEL] [START] [PRESETS] [SIDE]`, names separated by commas;
 //! START is `automatic`, `root` or `entry`, `wave` for the root and no beams, `cells` for rays that start from the cells of their origins,
 //! `single` for one call a ray, or `walker` for walks with only the next segment known. Rounds of the presets are
-//! interleaved.
+//! interleaved. Views have SIDE x SIDE rays (512); beams want 1024, as the record has. Where rays went in beams, a second
+//! line says what those cost.
 //!
 //! With the environment variable `PLAIN_CLOCK` time is taken from the wall clock, as Valgrind needs it.
 
 use anyhow::Context;
 use ropewalk::build::{BuildSettings, Preset};
-use ropewalk::kernel::{AllHits, BatchCaster, Level, Start};
+use ropewalk::kernel::{AllHits, BatchCaster, BatchReport, Level, Start};
 use ropewalk_bench::answer::BenchHit;
 use ropewalk_bench::harness::{Clock, Engine, Spread};
 use ropewalk_bench::own::{Walker, Wave};
@@ -44,6 +45,7 @@ fn main() -> anyhow::Result<()> {
         names if names.is_empty() => vec![Preset::Balanced],
         names => names.iter().map(|name| preset(name)).collect::<anyhow::Result<_>>()?,
     };
+    let side: usize = arguments.get(6).map_or(Ok(512), |n| n.parse())?;
     let catalog =
         Catalog { data: PathBuf::from("../shared/data"), generated: "target/bench-scenes".into() };
     println!(
@@ -71,7 +73,7 @@ fn main() -> anyhow::Result<()> {
         };
         let engines: Vec<Wave> = presets.iter().map(build).collect::<anyhow::Result<_>>()?;
         let trace = |rays: &[ropewalk::Ray], out: &mut [BenchHit]| engines[0].closest(rays, out);
-        let sizes = Sizes { side: 512, chords: 16_384, walk: 1 << 18 };
+        let sizes = Sizes { side, chords: 16_384, walk: 1 << 18 };
         let generator = Generator::new(&scene.mesh, &scene.view, sizes, &trace);
         for name in list(1) {
             let kind = Kind::named(&name).with_context(|| format!("no workload {name}"))?;
@@ -105,12 +107,13 @@ fn main() -> anyhow::Result<()> {
                 };
                 let n = rays.len() as f64;
                 let per = |count: u64| count as f64 / n;
+                let beams = in_beams(caster, kind.question(), &rays);
                 println!(
                     "{:12} {name:9} {:8} {:7.2} {ns:7.1} {:6.3} {:6.3} {:6.2} {:6.2} {:6.2} {:6.2} {:6.2} {:6.3} {:6.3}",
                     entry.name,
                     preset.name(),
                     1e3 / ns,
-                    per(in_beams(caster, kind.question(), &rays)),
+                    per(beams.beam_rays),
                     per(events.skipped),
                     per(events.looked),
                     per(events.boxed),
@@ -120,21 +123,33 @@ fn main() -> anyhow::Result<()> {
                     per(events.clear),
                     per(events.open)
                 );
+                if beams.beams > 0 {
+                    let each = |count: u64| count as f64 / beams.beams as f64;
+                    println!(
+                        "  {} beams, {} given up; a beam: rays {:.1}, steps {:.1}, blocks {:.1}, tests {:.1}, exact {:.2}",
+                        beams.beams,
+                        beams.given_up,
+                        each(beams.beam_rays),
+                        each(beams.steps),
+                        each(beams.blocks),
+                        each(beams.tests),
+                        each(beams.exact)
+                    );
+                }
             }
         }
     }
     Ok(())
 }
 
-/// Rays answered in beams.
-fn in_beams(caster: &BatchCaster<'_>, question: Question, rays: &[ropewalk::Ray]) -> u64 {
+/// Rays answered in beams, and what that took.
+fn in_beams(caster: &BatchCaster<'_>, question: Question, rays: &[ropewalk::Ray]) -> BatchReport {
     let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
-    let report = match question {
+    match question {
         Question::Occluded => caster.occluded_into(rays, &mut vec![false; rays.len()]),
-        Question::AllHits | Question::FirstHits(_) => return 0,
+        Question::AllHits | Question::FirstHits(_) => BatchReport::default(),
         _ => caster.closest_hit_into(rays, &mut t, &mut prim),
-    };
-    report.beam_rays
+    }
 }
 
 fn preset(name: &str) -> anyhow::Result<Preset> {
