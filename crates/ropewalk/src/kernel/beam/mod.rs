@@ -554,6 +554,8 @@ impl<Q: BeamQuery> Beams<'_, Q> {
             let prim_id = block.id[at as usize % WIDTH] & ID_MASK;
             // The same triangle in another leaf.
             let lanes = lanes & !L::Rays::load(&packet.prim).equals(prim_id);
+            // Rays that start on a surface leave the triangles around their start behind them.
+            let lanes = lanes & !settle::behind::<L::Rays>(packet, lines, at);
             if lanes == 0 {
                 return;
             }

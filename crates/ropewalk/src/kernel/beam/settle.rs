@@ -91,6 +91,65 @@ pub unsafe fn judge<L: BeamSimd>(
     judgement
 }
 
+/// Bound of a sum of products in units of half an ulp of 1 times the sum of their sizes: a term of three factors,
+/// of which two are differences, and their own product a difference again, is off by seven roundings, the sums add three.
+const TERMS_SLACK: f32 = 16.0 * f32::EPSILON / 2.0;
+
+/// Far beyond the reference test's own error in units of the largest product: some 30 terms in `f64`.
+const REFERENCE_SLACK: f32 = 1.0 / (1u64 << 44) as f32;
+
+/// Far above what underflows in `f32`; see [`behind`].
+const TINY: f32 = 1e-30;
+
+/// The lanes whose rays start beyond the plane of the triangle `at`, so that the reference test misses it: its parameter
+/// is below 0 for certain, however close to the triangle they start.
+///
+/// With the normal `n` of the plane and its vertex `a`, `t = n (a - origin) / n dir`. The signs of both products are taken
+/// where they exceed their rounding here and that of the reference test, which multiplies up to three coordinates
+/// relative to the origin (`reach` bounds them); differences are exact but for one rounding, so that the bound shrinks with the
+/// distance from the triangle.
+///
+/// # Safety
+/// As for [`Vector::splat`].
+#[inline(always)]
+pub unsafe fn behind<V: Vector>(packet: &Packet, lines: &Lines, at: At) -> u32 {
+    let vertex = &lines.block(at as usize / WIDTH).vertex;
+    let at = at as usize % WIDTH;
+    let a = [0, 1, 2].map(|k| vertex[0][k][at]);
+    let e = [0, 1, 2].map(|k| vertex[1][k][at] - a[k]);
+    let f = [0, 1, 2].map(|k| vertex[2][k][at] - a[k]);
+    let longest = |v: [f32; 3]| v.iter().fold(0.0f32, |m, x| m.max(x.abs()));
+    let longest = longest(e).max(longest(f));
+    // SAFETY: passed on to the caller; rows have `RAYS` numbers.
+    unsafe {
+        let zero = V::splat(0.0);
+        let (mut way, mut way_size, mut away) = (zero, zero, V::splat(longest));
+        let (mut slope, mut slope_size, mut dir_size) = (zero, zero, zero);
+        for k in 0..3 {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let (p, q) = (e[i] * f[j], e[j] * f[i]);
+            let (n, size) = (V::splat(p - q), V::splat(p.abs() + q.abs()));
+            let off = V::splat(a[k]) - V::load(&packet.origin[k]);
+            let dir = V::load(&packet.dir[k]);
+            way = n.mul_add(off, way);
+            way_size = size.mul_add(off.abs(), way_size);
+            away = away.max(off.abs());
+            slope = n.mul_add(dir, slope);
+            slope_size = size.mul_add(dir.abs(), slope_size);
+            dir_size = dir_size.max(dir.abs());
+        }
+        let reach = away + V::splat(longest);
+        let (terms, reference) = (V::splat(TERMS_SLACK), V::splat(REFERENCE_SLACK));
+        let squares = reference * reach * reach;
+        let slope_slack = terms.mul_add(slope_size, squares * dir_size) + V::splat(TINY);
+        let way_slack = terms.mul_add(way_size, squares * reach) + V::splat(TINY);
+        let way_slack = slope.abs().mul_add(V::splat(TINY), way_slack);
+        let ends = (slope_slack.lt(slope) & way.lt(zero - way_slack))
+            | (slope.lt(zero - slope_slack) & way_slack.lt(way));
+        ends & zero.le(V::load(&packet.t[0]))
+    }
+}
+
 /// The lanes from `first` on.
 #[inline(always)]
 unsafe fn judge_lanes<D: Doubles>(
