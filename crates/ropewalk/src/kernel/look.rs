@@ -92,33 +92,9 @@ mod tests {
     use crate::aabb::Aabb;
     use crate::geometry::Geometry;
     use crate::kernel::beam::PortableLanes;
+    use crate::kernel::random::Random;
     use crate::kernel::slot::Loaded;
     use crate::ray::{PreparedRay, Ray};
-
-    /// Numbers from a fixed seed (xorshift).
-    struct Random(u64);
-
-    impl Random {
-        fn next(&mut self) -> u64 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            self.0
-        }
-
-        fn below(&mut self, n: u64) -> usize {
-            (self.next() % n) as usize
-        }
-
-        /// Between 0 and 1.
-        fn share(&mut self) -> f32 {
-            (self.next() >> 40) as f32 / (1 << 24) as f32
-        }
-
-        fn signed(&mut self) -> f32 {
-            2.0 * self.share() - 1.0
-        }
-    }
 
     /// The looks of all levels that need no features of the machine: what they share is the arithmetic.
     fn looks(slot: &Slot, block: &Block) -> [u32; 4] {

@@ -31,6 +31,8 @@ mod order;
 mod particles;
 pub(crate) mod point;
 mod query;
+#[cfg(test)]
+mod random;
 mod scalar;
 mod single;
 mod slot;

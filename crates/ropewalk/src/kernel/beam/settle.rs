@@ -243,3 +243,76 @@ pub unsafe fn gather<L: BeamSimd>(
         hits
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::BuildSettings;
+    use crate::geometry::Geometry;
+    use crate::kernel::beam::PortableLanes;
+    use crate::kernel::exact::place;
+    use crate::kernel::random::Random;
+    use crate::primitive::{Sides, Triangle};
+    use crate::ray::Ray;
+    use crate::wide::WideTree;
+
+    /// Rays that start in a triangle, a few ulps beside it, or near it, at many sizes and places, slivers among them.
+    #[test]
+    fn rays_said_to_start_beyond_a_triangle_miss_it() {
+        let mut random = Random(0x5EED_0F7A_91E5);
+        let (mut asked, mut behind_count, mut near_count) = (0u32, 0u32, 0u32);
+        for round in 0..4000 {
+            let size = [1e-20, 1e-6, 1.0, 1e6][round % 4] * (1.0 + random.share());
+            let place_of = [0.0, 1.0, 100.0][random.below(3)] * size;
+            let middle: [f32; 3] = std::array::from_fn(|_| place_of * random.signed());
+            let mut vertex = || std::array::from_fn(|a| middle[a] + size * random.signed());
+            let (a, b, mut c): ([f32; 3], [f32; 3], [f32; 3]) = (vertex(), vertex(), vertex());
+            if round % 3 == 0 {
+                // A sliver.
+                let s = random.share();
+                c = std::array::from_fn(|k| {
+                    a[k] + s * (b[k] - a[k]) + size * 1e-5 * random.signed()
+                });
+            }
+            let from = |random: &mut Random| {
+                let (u, v) = (random.share(), random.share());
+                let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+                let off = [0.0, 1e-7, 1e-6, 1e-3][random.below(4)] * size;
+                std::array::from_fn(|k| {
+                    a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]) + off * random.signed()
+                })
+            };
+            let rays: Vec<Ray> = (0..RAYS)
+                .map(|_| {
+                    let origin = from(&mut random);
+                    let dir = std::array::from_fn(|_| random.signed());
+                    Ray { origin, dir, t_min: 0.0, t_max: f32::INFINITY }
+                })
+                .collect();
+            let mut geometry = Geometry::new();
+            geometry.push(Triangle { vertices: [a, b, c] }, Sides::Both).unwrap();
+            let (tree, _) = WideTree::build(&geometry, &BuildSettings::default(), &()).unwrap();
+            let Some(line) = tree.block_lines(tree.root()).next() else { continue };
+            let (at, mut packet) = (place(line, 0), Packet::EMPTY);
+            packet.load(&rays, 0);
+            let exact = Exact { lines: tree.lines(), rays: &rays };
+            // SAFETY: portable code.
+            let behind = unsafe { behind::<PortableLanes<RAYS>>(&packet, tree.lines(), at) };
+            for lane in 0..RAYS {
+                let hit = exact.hit(lane as u32, at);
+                asked += 1;
+                near_count += u32::from(hit.is_some());
+                behind_count += behind >> lane & 1;
+                assert!(
+                    behind >> lane & 1 == 0 || hit.is_none(),
+                    "{:?} hits {:?} at {hit:?}",
+                    rays[lane],
+                    [a, b, c]
+                );
+            }
+        }
+        // Neither "never" nor "always" passes.
+        assert!(behind_count > asked / 10, "{behind_count} of {asked} are said to start beyond");
+        assert!(near_count > asked / 10, "{near_count} of {asked} hit");
+    }
+}
