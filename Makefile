@@ -4,8 +4,9 @@ SHELL := /bin/bash
 CARGO ?= cargo
 OUT ?= out
 FUZZ_SECONDS ?= 60
+PREFIX ?= /usr/local
 
-.PHONY: help demo test check fmt clippy unit doc inlined python fuzz bench bench-build bench-python clean
+.PHONY: help demo test check fmt clippy unit doc inlined c install-c python fuzz bench bench-build bench-python clean
 
 help: ## List the commands
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -24,7 +25,7 @@ demo: tools ## Render a scene to a picture and print what each idea of the 1997 
 	@./target/release/ropewalk paper --scenes gears --size standard --rays 20000 --no-sensitivity -o $(OUT)/paper.html
 	@echo "==> picture: $(OUT)/gears.png   report: $(OUT)/paper.html"
 
-test: tools fmt clippy unit doc inlined python fuzz ## Everything that CI runs: format, lints, tests, docs, inlining, the Python package, fuzz
+test: tools fmt clippy unit doc inlined c python fuzz ## Everything that CI runs: format, lints, tests, docs, inlining, the C library, the Python package, fuzz
 
 fmt: tools
 	@echo "==> format"
@@ -45,6 +46,13 @@ doc: tools
 inlined: tools
 	@echo "==> vector instructions inlined"
 	@scripts/inlined
+
+c: tools ## Compile, run and sanitise the examples of the C library
+	@echo "==> the C library"
+	@scripts/test-c
+
+install-c: tools ## Install the C library: header, shared and static library, pkg-config file (PREFIX=/usr/local)
+	@scripts/install-c $(PREFIX)
 
 python: tools ## Build a wheel of the Python package and test it in fresh virtual environments (needs python3)
 	@echo "==> the Python package"
