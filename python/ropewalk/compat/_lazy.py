@@ -1,0 +1,91 @@
+"""Scenes that are built when they are first asked, and places where a ray meets several faces."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .._arrays import as_faces, as_float32, as_rows
+from .._scene import Scene
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .._hits import HitLists
+
+#: Hits of a ray in float64 that differ by less than this share of the distance from its origin to the farthest
+#: corner of the scene's box are one place. The parameter of a triangle that is met at an angle of at least 2^-9 is
+#: off by no more than 2^-41 of the distance of its corners: eight roundings of 2^-53, over the angle.
+SAME_PLACE = 2.0**-40
+
+
+class LazyScene:
+    """Meshes in float32, and the scene of them, built when it is first asked for and again after more were added."""
+
+    def __init__(self, threads: int = 0) -> None:
+        self._threads = threads
+        self._meshes: list[tuple[NDArray[np.float32], NDArray[np.uint32]]] = []
+        self._scene: Scene | None = None
+        self._corners: NDArray[np.float32] | None = None
+        self._lock = threading.Lock()
+
+    def add(self, vertices: Any, faces: Any, names: tuple[str, str]) -> int:
+        """Adds a mesh, of which the arrays are copied; its number. ``names`` are those of the arguments."""
+        given = as_rows(vertices, names[0])
+        corners = as_faces(faces, names[1], len(given))
+        points = np.array(as_float32(np.asarray(given)))
+        # What is wrong with vertices, and what rounding does to them, is said now and not by the first query.
+        Scene(given, corners[:1], precision="single", threads=1)
+        with self._lock:
+            self._meshes.append((points, np.array(corners)))
+            self._scene = self._corners = None
+            return len(self._meshes) - 1
+
+    def scene(self) -> Scene:
+        """The scene of all meshes so far."""
+        with self._lock:
+            if self._scene is None:
+                self._scene = Scene.from_meshes(
+                    self._meshes, precision="single", threads=self._threads
+                )
+            return self._scene
+
+    def triangles(self, geom: NDArray[Any], prim: NDArray[Any]) -> NDArray[np.float64]:
+        """Corners of triangles that queries named, shape (N, 3, 3)."""
+        with self._lock:
+            if self._corners is None:
+                parts = [points[faces] for points, faces in self._meshes]
+                self._corners = np.concatenate([*parts, np.empty((0, 3, 3), np.float32)])
+            ends = np.cumsum([0, *(len(faces) for _, faces in self._meshes)])
+            return np.asarray(self._corners[ends[geom] + prim], np.float64)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_threads": self._threads, "_meshes": self._meshes}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(state["_threads"])  # type: ignore[misc]
+        self._meshes = state["_meshes"]
+
+
+def first_of_places(
+    hits: HitLists, slack: NDArray[np.float64] | None = None, by_mesh: bool = False
+) -> NDArray[np.bool_]:
+    """True for each hit that begins a place: a run of hits of one ray at the same parameter.
+
+    Faces that share an edge are met at one place by a ray through it; so are coincident ones.
+
+    Args:
+        slack: by how much parameters of one place may differ from one to the next, a number a ray.
+        by_mesh: hits of several meshes are several places.
+    """
+    first = np.ones(len(hits.t), bool)
+    if len(first) > 1:
+        off: Any = 0.0 if slack is None else slack[hits.ray_id[1:]]
+        first[1:] = np.diff(hits.t) > off
+        if by_mesh:
+            first[1:] |= np.diff(hits.geom_id) != 0
+        starts = hits.offsets[:-1][np.diff(hits.offsets) > 0]
+        first[starts] = True
+    return first
