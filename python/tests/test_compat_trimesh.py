@@ -158,7 +158,8 @@ def test_max_hits_counts_places():
     vertices = np.concatenate([vertices, [[0, 0, 8], [1, 0, 8], [1, 1, 8], [0, 1, 8]]])
     ray = intersector((vertices, np.concatenate([indices, [[64, 65, 66], [64, 66, 67], [64, 65, 66]]])))
     for limit in (1, 2, 3, 5):
-        where = ray.intersects_id([[0.7, 0.4, 9]], [DOWN], max_hits=limit, return_locations=True)[2]
+        tri, of, where = ray.intersects_id([[0.7, 0.4, 9]], [DOWN], max_hits=limit, return_locations=True)
+        assert len(tri) == len(of) == limit
         np.testing.assert_allclose(where[:, 2], [8, 7.5, 7, 6.5, 6][:limit])
 
 
@@ -512,6 +513,6 @@ def test_a_trimesh_that_changes():
 def test_trimesh_is_not_needed():
     code = (
         "import sys; sys.modules.update(trimesh=None, open3d=None, embreex=None)\n"
-        "import ropewalk.compat.trimesh, ropewalk.compat.embreex\n"
+        "import ropewalk.compat.trimesh, ropewalk.compat.embreex, ropewalk.compat.open3d\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

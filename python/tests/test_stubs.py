@@ -84,7 +84,7 @@ MODULES = ["ropewalk"] + [
 ]
 MODULES += ["ropewalk.compat"] + [
     f"ropewalk.compat.{name}"
-    for name in ("embreex", "embreex.mesh_construction", "embreex.rtcore", "embreex.rtcore_scene", "trimesh")
+    for name in ("embreex", "embreex.mesh_construction", "embreex.rtcore", "embreex.rtcore_scene", "open3d", "trimesh")
 ]
 
 
