@@ -147,6 +147,25 @@ def test_counting_through_edges_and_vertices_of_a_sphere():
     assert (np.diff(scene.list_intersections(across)["ray_splits"].astype(int)) == 2).all()
 
 
+def test_faces_of_a_vertex_are_one_place_where_float32_ends():
+    """Along an axis through vertices the parameter is a difference of coordinates, often in the middle of two float32."""
+    vertices, triangles = sphere(4)
+    vertices = np.float32(vertices)
+    low = vertices[np.linalg.norm(vertices[:, :2], axis=1) < 0.98]
+    rays = np.zeros((len(low), 6), np.float32)
+    rays[:, :2], rays[:, 2], rays[:, 5] = low[:, :2], -3.1, 1
+    for meshes in ([(vertices, triangles)], [(vertices, triangles), (vertices, triangles)]):
+        scene = scene_of(*meshes)
+        assert (scene.count_intersections(rays) == 2 * len(meshes)).all()
+        assert len(scene.list_intersections(rays)["t_hit"]) == 2 * len(meshes) * len(low)
+    # Two sheets of one mesh that are one unit in the last place apart are two.
+    sheets = np.float32([[0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 0], [4, 0, 0], [0, 4, 0]])
+    sheets[3:, 2] = np.float32(2**-22)
+    scene = scene_of((sheets, [[0, 1, 2], [3, 4, 5]]))
+    ans = scene.list_intersections([[1, 1, -2.5, 0, 0, 1]])
+    assert ans["t_hit"].tolist() == [2.5, np.nextafter(np.float32(2.5), np.float32(3))]
+
+
 @pytest.mark.parametrize("make", [random_mesh, grid_mesh, degenerate_mesh])
 def test_brute_force(make):
     rng = np.random.default_rng(17)

@@ -61,6 +61,36 @@ class LazyScene:
             ends = np.cumsum([0, *(len(faces) for _, faces in self._meshes)])
             return np.asarray(self._corners[ends[geom] + prim], np.float64)
 
+    def first_of_places(
+        self, hits: HitLists, origins: NDArray[Any], directions: NDArray[Any]
+    ) -> NDArray[np.bool_]:
+        """True for each hit that begins a place: of hits of one ray and mesh at one parameter the first.
+
+        Parameters are equal in float32, or next to each other and equal in float64: where the true one lies in the
+        middle of two float32 the faces of an edge may be rounded to either.
+        """
+        count, ray = len(hits.t), hits.ray_id
+        order = np.lexsort((hits.t, hits.geom_id, ray)) if len(self._meshes) > 1 else np.arange(count)
+        t = hits.t[order]
+        same = (np.diff(ray[order]) == 0) & (np.diff(hits.geom_id[order]) == 0)
+        ties = same & (t[1:] == np.nextafter(t[:-1], np.float32(np.inf)))
+        same &= np.diff(t) == 0
+        (at,) = np.nonzero(ties)
+        if len(at):
+            pair = order[np.stack([at, at + 1])]
+            o = origins.reshape(-1, 3)[ray[pair]].astype(np.float64)
+            d = directions.reshape(-1, 3)[ray[pair]].astype(np.float64)
+            corners = self.triangles(hits.geom_id[pair], hits.prim_id[pair])
+            normal = np.cross(corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :])
+            with np.errstate(all="ignore"):
+                exact = np.sum(normal * (corners[..., 0, :] - o), -1) / np.sum(normal * d, -1)
+                far = np.linalg.norm(corners - o[..., None, :], axis=-1).max(axis=(0, -1))
+                slack = SAME_PLACE * far / np.linalg.norm(d[0], axis=-1)
+                same[at] = np.abs(exact[1] - exact[0]) <= slack
+        first = np.ones(count, bool)
+        first[order[1:]] = ~same
+        return first
+
     def __getstate__(self) -> dict[str, Any]:
         return {"_threads": self._threads, "_meshes": self._meshes}
 
@@ -69,23 +99,15 @@ class LazyScene:
         self._meshes = state["_meshes"]
 
 
-def first_of_places(
-    hits: HitLists, slack: NDArray[np.float64] | None = None, by_mesh: bool = False
-) -> NDArray[np.bool_]:
+def first_of_places(hits: HitLists, slack: NDArray[np.float64]) -> NDArray[np.bool_]:
     """True for each hit that begins a place: a run of hits of one ray at the same parameter.
 
-    Faces that share an edge are met at one place by a ray through it; so are coincident ones.
-
-    Args:
-        slack: by how much parameters of one place may differ from one to the next, a number a ray.
-        by_mesh: hits of several meshes are several places.
+    Faces that share an edge are met at one place by a ray through it; so are coincident ones. ``slack`` is by how
+    much parameters of one place may differ from one to the next, a number a ray.
     """
     first = np.ones(len(hits.t), bool)
     if len(first) > 1:
-        off: Any = 0.0 if slack is None else slack[hits.ray_id[1:]]
-        first[1:] = np.diff(hits.t) > off
-        if by_mesh:
-            first[1:] |= np.diff(hits.geom_id) != 0
+        first[1:] = np.diff(hits.t) > slack[hits.ray_id[1:]]
         starts = hits.offsets[:-1][np.diff(hits.offsets) > 0]
         first[starts] = True
     return first

@@ -24,7 +24,7 @@ import numpy as np
 
 from .._arrays import ArrayLike, as_array, as_float32, as_float64, as_integer, as_threads
 from .._errors import ArgumentError, ArgumentTypeError
-from ._lazy import LazyScene, first_of_places
+from ._lazy import LazyScene
 
 if TYPE_CHECKING:
     from numpy.typing import DTypeLike, NDArray
@@ -214,7 +214,7 @@ class RaycastingScene:
         for start in range(0, len(o), _BLOCK):
             part = slice(start, start + _BLOCK)
             lists = scene.all_hits(o[part], d[part], threads=threads)
-            kept = lists.ray_id[first_of_places(lists, by_mesh=True)]
+            kept = lists.ray_id[self._meshes.first_of_places(lists, o[part], d[part])]
             counts[part] = np.bincount(kept, minlength=len(lists.offsets) - 1)
         return _tensor(counts.reshape(shape))
 
@@ -238,7 +238,7 @@ class RaycastingScene:
         """
         o, d = _rays(rays)
         lists = self._meshes.scene().all_hits(o, d, threads=as_threads(nthreads))
-        keep = first_of_places(lists, by_mesh=True)
+        keep = self._meshes.first_of_places(lists, o, d)
         splits = np.concatenate([[0], np.cumsum(keep)])[lists.offsets]
         # Open3D's are uint32, which holds no more than that.
         small = np.uint32 if splits[-1] < 2**32 and len(splits) <= 2**32 else np.int64
