@@ -200,17 +200,42 @@ def closed(faces):
     return np.array_equal(np.sort(ahead), np.sort(edges[:, 1] << 32 | edges[:, 0]))
 
 
-def row(mesh, work, what, peer, answers, truth, lacks):
-    """A line of the table: where two differ, who is right, and which wrong answers lack something."""
-    right = np.array([[judged(answer) for judged, answer in zip(truth, given)] for given in answers])
-    lack = ~right & np.array([lacks(np.asarray(given)) for given in answers])
-    differ = np.asarray(answers[0]) != np.asarray(answers[1])
-    wrong = [f"{(~r).sum():,} ({m.sum():,})" for r, m in zip(right, lack)]
-    print(
-        f"| {mesh} | {work} | {what} | {peer} | {len(differ):,} | {differ.sum():,} | "
-        f"{(differ & right.all(axis=0)).sum():,} | {' | '.join(wrong)} |",
-        flush=True,
-    )
+class Table:
+    """Lines of what two answered, where they differ and who is right, and their sums over the meshes."""
+
+    HEAD = "asked | differ | both right | peer wrong (lost) | drop-in wrong (lost) |"
+
+    def __init__(self):
+        self.sums = {}
+        print(f"| mesh | rays | answer | peer | {self.HEAD}\n|{' --- |' * 9}")
+
+    def row(self, mesh, work, what, peer, answers, truth, lacks):
+        """Prints a line; which answers of the drop-in are wrong."""
+        right = np.array([[judged(answer) for judged, answer in zip(truth, given)] for given in answers])
+        lack = ~right & np.array([lacks(np.asarray(given)) for given in answers])
+        differ = np.asarray(answers[0]) != np.asarray(answers[1])
+        numbers = [len(differ), differ.sum(), (differ & right.all(axis=0)).sum()]
+        numbers += [n for r, m in zip(right, lack) for n in ((~r).sum(), m.sum())]
+        print(f"| {mesh} | {work} | {what} | {peer} | {self.line(numbers)}", flush=True)
+        self.sums[work, what, peer] = self.sums.get((work, what, peer), 0) + np.array(numbers)
+        return np.flatnonzero(~right[1])
+
+    @staticmethod
+    def line(numbers):
+        asked, differ, both, *wrong = (f"{n:,}" for n in numbers)
+        return f"{asked} | {differ} | {both} | {wrong[0]} ({wrong[1]}) | {wrong[2]} ({wrong[3]}) |"
+
+    def end(self):
+        """Prints the sums."""
+        print(f"\n| rays | answer | peer | {self.HEAD}\n|{' --- |' * 8}")
+        for names, numbers in self.sums.items():
+            print(f"| {' | '.join(names)} | {self.line(numbers)}")
+
+
+def beside(judge, o, d, judged, answer, rng):
+    """Whether an answer is right for another ray, of which the direction is off by 2^-52 of its components at most."""
+    moved = np.float64(d) * (1 + rng.integers(-2, 3, (BLOCK, 3)) * 2.0**-53)
+    return any(judged(hits, answer) for hits, _ in judge.hits(np.tile(np.float64(o), (BLOCK, 1)), moved))
 
 
 def main():
@@ -220,8 +245,7 @@ def main():
     parser.add_argument("--rays", type=int, default=4096, help="of each kind")
     arguments = parser.parse_args()
     print(f"ropewalk {ropewalk.__version__}, {ropewalk.simd_level()}")
-    print("| mesh | rays | answer | peer | asked | differ | both right | peer wrong (lost) | drop-in wrong (lost) |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    table, wrong, explained = Table(), 0, 0
     for file in arguments.meshes.split(","):
         vertices, faces = ropewalk.read_mesh(arguments.data / "mesh" / file)
         vertices, faces = np.float32(vertices), np.int32(faces)
@@ -234,13 +258,19 @@ def main():
             lost = lambda prim, met=met: (prim < 0) & met  # noqa: E731
             closest = [lambda prim, hits=hits: right_closest(hits, prim) for hits in found]
             for peer, asked in made.items():
-                row(name, work, "closest", peer, [ask(o, d) for ask in asked[0]], closest, lost)
+                answers = [ask(o, d) for ask in asked[0]]
+                for i in table.row(name, work, "closest", peer, answers, closest, lost):
+                    wrong, explained = wrong + 1, explained + beside(judge, o[i], d[i], right_closest, answers[1][i], rng)
                 if asked[1] is None:
                     continue
-                numbers = [places(hits, peer.startswith("trimesh"), gap) for hits, gap in zip(found, gaps)]
+                finely = peer.startswith("trimesh")
+                numbers = np.array([places(hits, finely, gap) for hits, gap in zip(found, gaps)])
                 counts = [lambda count, number=number: count == number for number in numbers]
-                few = lambda count, numbers=np.array(numbers): count < numbers  # noqa: E731
-                row(name, work, "hits", peer, [ask(o, d) for ask in asked[1]], counts, few)
+                few = lambda count, numbers=numbers: count < numbers  # noqa: E731
+                answers = [ask(o, d) for ask in asked[1]]
+                for i in table.row(name, work, "hits", peer, answers, counts, few):
+                    as_many = lambda hits, count, gap=gaps[i], finely=finely: places(hits, finely, gap) == count  # noqa: E731
+                    wrong, explained = wrong + 1, explained + beside(judge, o[i], d[i], as_many, answers[1][i], rng)
         if not closed(faces):
             continue
         low, high = vertices.min(axis=0).astype(float), vertices.max(axis=0).astype(float)
@@ -258,7 +288,12 @@ def main():
             sides = [lambda side, truth=truth: side == truth for truth in inside]
             for peer, asked in made.items():
                 if len(asked) > 2:
-                    row(name, f"{work} (points)", "inside", peer, [ask(points) for ask in asked[2]], sides, lambda side: ~side)
+                    table.row(name, f"{work} (points)", "inside", peer, [ask(points) for ask in asked[2]], sides, lambda side: ~side)
+    table.end()
+    print(
+        f"\nwrong answers of drop-ins about rays: {wrong}; of these right for a ray whose direction is off by 2^-52 at "
+        f"most: {explained}"
+    )
 
 
 if __name__ == "__main__":

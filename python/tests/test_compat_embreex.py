@@ -125,10 +125,11 @@ def test_elements():
 
 def test_meshes_added_after_a_run_count():
     scene = scene_of(wall(7))
-    assert scene.run(ORIGINS, ALONG)[0] == 0
+    assert scene.run(ORIGINS, ALONG, output=1)["primID"][0] == 0
     TriangleMesh(scene, np.float32([[[5, -1, -1], [5, 1, -1], [5, -1, 1]]]))
     found = scene.run(ORIGINS, ALONG, output=1)
     assert found["geomID"].tolist() == [1, 0, 0, -1]
+    np.testing.assert_array_equal(found["Ng"], [[4, 0, 0]] * 3 + [[0, 0, 0]])
 
 
 def test_vertices_are_copied():

@@ -384,6 +384,9 @@ def test_bad_input():
     ):
         with pytest.raises(ropewalk.ArgumentTypeError):
             call()
+    with pytest.raises(ropewalk.ArgumentError, match=r"vertex_positions\[1\] is \(NaN") as caught:
+        scene.add_triangles([[0, 0, 0], [np.nan, 0, 0], [1, 1, 0]], faces)
+    assert (caught.value.argument, caught.value.index) == ("vertex_positions", 1)
     assert scene.cast_rays(RAYS)["t_hit"][0] == 1
     with pytest.warns(ropewalk.InvalidRayWarning):
         assert scene.cast_rays([[np.nan, 0, 0, 0, 0, 1]])["geometry_ids"][0] == INVALID

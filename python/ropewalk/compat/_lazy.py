@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .._arrays import as_faces, as_float32, as_rows
+from .._errors import ArgumentError
 from .._scene import Scene
 
 if TYPE_CHECKING:
@@ -21,14 +22,19 @@ if TYPE_CHECKING:
 SAME_PLACE = 2.0**-40
 
 
+_Mesh = tuple["NDArray[np.float32]", "NDArray[np.uint32]"]
+
+
 class LazyScene:
     """Meshes in float32, and the scene of them, built when it is first asked for and again after more were added."""
 
     def __init__(self, threads: int = 0) -> None:
         self._threads = threads
-        self._meshes: list[tuple[NDArray[np.float32], NDArray[np.uint32]]] = []
-        self._scene: Scene | None = None
-        self._corners: NDArray[np.float32] | None = None
+        self._meshes: tuple[_Mesh, ...] = ()
+        # What was made of which meshes. Two threads may make it at once, with the same outcome.
+        self._scene: tuple[tuple[_Mesh, ...], Scene] | None = None
+        self._corners: tuple[tuple[_Mesh, ...], NDArray[np.float32]] | None = None
+        # Held for an assignment alone, so that a process may fork while another thread builds.
         self._lock = threading.Lock()
 
     def add(self, vertices: Any, faces: Any, names: tuple[str, str]) -> int:
@@ -37,29 +43,32 @@ class LazyScene:
         corners = as_faces(faces, names[1], len(given))
         points = np.array(as_float32(np.asarray(given)))
         # What is wrong with vertices, and what rounding does to them, is said now and not by the first query.
-        Scene(given, corners[:1], precision="single", threads=1)
+        try:
+            Scene(given, corners[:1], precision="single", threads=1)
+        except ArgumentError as error:
+            message = str(error).replace("vertices", names[0], 1)
+            raise ArgumentError(message, names[0], error.index) from None
+        mesh = points, np.array(corners)
         with self._lock:
-            self._meshes.append((points, np.array(corners)))
-            self._scene = self._corners = None
+            self._meshes = (*self._meshes, mesh)
             return len(self._meshes) - 1
 
     def scene(self) -> Scene:
         """The scene of all meshes so far."""
-        with self._lock:
-            if self._scene is None:
-                self._scene = Scene.from_meshes(
-                    self._meshes, precision="single", threads=self._threads
-                )
-            return self._scene
+        built, meshes = self._scene, self._meshes
+        if built is None or built[0] is not meshes:
+            scene = Scene.from_meshes(meshes, precision="single", threads=self._threads)
+            built = self._scene = meshes, scene
+        return built[1]
 
     def triangles(self, geom: NDArray[Any], prim: NDArray[Any]) -> NDArray[np.float64]:
-        """Corners of triangles that queries named, shape (N, 3, 3)."""
-        with self._lock:
-            if self._corners is None:
-                parts = [points[faces] for points, faces in self._meshes]
-                self._corners = np.concatenate([*parts, np.empty((0, 3, 3), np.float32)])
-            ends = np.cumsum([0, *(len(faces) for _, faces in self._meshes)])
-            return np.asarray(self._corners[ends[geom] + prim], np.float64)
+        """Corners of triangles that queries named, shape (..., 3, 3)."""
+        made, meshes = self._corners, self._meshes
+        if made is None or made[0] is not meshes:
+            parts = [points[faces] for points, faces in meshes]
+            made = self._corners = meshes, np.concatenate([*parts, np.empty((0, 3, 3), np.float32)])
+        starts = np.cumsum([0, *(len(faces) for _, faces in meshes)])
+        return np.asarray(made[1][starts[geom] + prim], np.float64)
 
     def first_of_places(
         self, hits: HitLists, origins: NDArray[Any], directions: NDArray[Any]
