@@ -55,7 +55,7 @@ def public_calls():
 def examples():
     """Runs the examples of all modules; how many there are."""
     count = 0
-    for info in pkgutil.iter_modules(ropewalk.__path__, "ropewalk."):
+    for info in pkgutil.walk_packages(ropewalk.__path__, "ropewalk."):
         if info.name != "ropewalk._ropewalk":
             result = doctest.testmod(importlib.import_module(info.name))
             assert result.failed == 0, info.name

@@ -82,6 +82,10 @@ MODULES = ["ropewalk"] + [
     f"ropewalk._{name}"
     for name in ("file", "hits", "mesh", "points", "rays", "report", "scene", "walker")
 ]
+MODULES += ["ropewalk.compat"] + [
+    f"ropewalk.compat.{name}"
+    for name in ("embreex", "embreex.mesh_construction", "embreex.rtcore", "embreex.rtcore_scene", "open3d", "trimesh")
+]
 
 
 @pytest.mark.parametrize("module", MODULES)
@@ -90,7 +94,7 @@ def test_examples(module):
     assert result.attempted > 0 and result.failed == 0
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/python.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/python.md", "docs/coming-from.md"])
 def test_code_of_the_pages(page):
     text = pathlib.Path(__file__).parents[2].joinpath(page).read_text()
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
