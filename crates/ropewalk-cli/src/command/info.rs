@@ -88,6 +88,7 @@ fn meaning(tag: Tag) -> &'static str {
         Tag::FIGURES => "figures of the build",
         Tag(name) if name == *b"view" => "the scene's view",
         Tag(name) if name == *b"mesh" => "meshes of the Python package",
+        Tag(name) if name == *b"quad" => "quads of the Python package",
         _ => "not known",
     }
 }
