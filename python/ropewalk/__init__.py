@@ -36,6 +36,7 @@ from ._points import Cells, ClosestPoints
 from ._report import Report
 from ._ropewalk import default_threads, simd_level
 from ._scene import Scene, load
+from ._shapes import Cones, Cylinders, Spheres
 from ._walker import Events, Walker
 
 __version__ = _version("ropewalk")
@@ -45,6 +46,8 @@ __all__ = [
     "ArgumentTypeError",
     "Cells",
     "ClosestPoints",
+    "Cones",
+    "Cylinders",
     "Events",
     "HitLists",
     "Hits",
@@ -63,6 +66,7 @@ __all__ = [
     "SceneNotFoundError",
     "SceneReadError",
     "SceneWriteError",
+    "Spheres",
     "Walker",
     "default_threads",
     "load",

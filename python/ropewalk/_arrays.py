@@ -116,10 +116,16 @@ def as_choice(value: Any, argument: str, choices: tuple[str, ...]) -> str:
 
 
 def as_faces(value: ArrayLike, argument: str, vertices: int) -> np.ndarray:
-    """Faces as uint32, every index checked before it is narrowed."""
-    faces = as_rows(value, argument)
+    """Faces as uint32, shape (N, 3) or (N, 4), every index checked before it is narrowed."""
+    faces = as_array(value, argument)
+    if faces.shape == (0,):
+        faces = faces.reshape(0, 3)
+    if faces.ndim != 2 or faces.shape[1] not in (3, 4):
+        raise ArgumentError(
+            f"{argument}: expected an array of shape (N, 3) or (N, 4), found {faces.shape}", argument
+        )
     if faces.size == 0:
-        return np.empty((0, 3), np.uint32)
+        return np.empty((0, faces.shape[1]), np.uint32)
     if faces.dtype.kind == "f":
         raise ArgumentTypeError(
             f"{argument}: expected integers, found dtype {faces.dtype}", argument
@@ -129,6 +135,8 @@ def as_faces(value: ArrayLike, argument: str, vertices: int) -> np.ndarray:
         face = int(np.argmax(wrong.any(axis=1)))
         found = int(faces[face][wrong[face]][0])
         expected = f"expected 0 to {vertices - 1}" if vertices else "there are no vertices"
+        if found == -1 and faces.shape[1] == 4:
+            expected += "; a triangle among quads has its third index twice"
         raise ArgumentError(f"{argument}[{face}] names vertex {found}; {expected}", argument, face)
     if faces.dtype == np.int32 and faces.dtype.isnative and faces.flags.c_contiguous:
         faces = faces.view(np.uint32)
@@ -166,3 +174,21 @@ def per_ray(array: np.ndarray, shape: tuple[int, ...], argument: str) -> np.ndar
             f"found {array.shape}",
             argument,
         ) from None
+
+
+def moved(given: np.ndarray, rounded: np.ndarray) -> tuple[float, float]:
+    """By how much rounding moves points at most, and the diagonal of all; bit by bit, to spare memory.
+
+    Infinite for numbers beyond float32, 0 where a number is none.
+    """
+    kind, size = given.dtype.kind, given.dtype.itemsize
+    if (kind == "f" and size <= 4) or (kind in "iu" and size <= 2) or not len(given):
+        return 0.0, 0.0
+    if not np.isfinite(rounded).all():
+        return (np.inf if np.isfinite(given).all() else 0.0), 0.0
+    span = rounded.max(axis=0).astype(np.float64) - rounded.min(axis=0)
+    step, worst = 1 << 16, 0.0
+    for start in range(0, len(given), step):
+        part = slice(start, start + step)
+        worst = max(worst, float(np.abs(given[part] - rounded[part].astype(np.float64)).max()))
+    return worst, float(np.linalg.norm(span))

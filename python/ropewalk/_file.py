@@ -66,7 +66,7 @@ class Saved:
                 Saving over it is safe.
             vertices: with ``faces``, open the file only if the scene was made of these arrays, rounded to
                 float32 unless it is of double precision.
-            faces: see ``vertices``.
+            faces: see ``vertices``; quads as rows of four.
 
         Raises:
             SceneNotFoundError: the file cannot be opened.

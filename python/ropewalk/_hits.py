@@ -54,8 +54,11 @@ class _Surface:
     def uv(self) -> NDArray[Any]:
         """Barycentric weights of vertices 1 and 2, shape (..., 2); NaN for a miss.
 
-        A hit is at ``(1 - u - v) * v0 + u * v1 + v * v2`` (Embree's order). Both are 0 on primitives
-        that are no triangles. Worked out when first asked for, from the arrays of the query.
+        A hit is at ``(1 - u - v) * v0 + u * v1 + v * v2`` (Embree's order). On a quad they run from (0, 0) at vertex
+        0 over (1, 0) at vertex 1 and (1, 1) at vertex 2 to (0, 1) at vertex 3, as Embree's do, linear on each of its
+        triangles: the hit is at ``(1 - u) * v0 + (u - v) * v1 + v * v2`` where ``u >= v``, else at
+        ``(1 - v) * v0 + u * v2 + (v - u) * v3``. Both are 0 on spheres, cones, polygons and patches. Worked out
+        when first asked for, from the arrays of the query.
         """
         return self._look("uv")
 
@@ -63,7 +66,8 @@ class _Surface:
     def normal(self) -> NDArray[Any]:
         """Unit normals of the surface, shape (..., 3); NaN for a miss.
 
-        They point to the side from which the vertices run counter-clockwise, whichever side was hit.
+        They point to the side from which the vertices run counter-clockwise, whichever side was hit; of a quad that
+        is not flat it is the triangle's that was hit. Those of spheres and cones point outwards.
         """
         return self._look("normal")
 
@@ -71,7 +75,7 @@ class _Surface:
     def position(self) -> NDArray[Any]:
         """Points of the hits, shape (..., 3); NaN for a miss.
 
-        On triangles from ``uv``, which is nearer to the surface than ``origin + t * direction`` in
+        On triangles and quads from their vertices, which is nearer to the surface than ``origin + t * direction`` in
         float32; worked out in float64 and rounded once.
         """
         return self._look("position")

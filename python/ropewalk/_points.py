@@ -22,14 +22,15 @@ _FEW_POINTS = 512
 
 
 class ClosestPoints(NamedTuple):
-    """The nearest triangle of each point, in arrays of the points' shape.
+    """The nearest face of each point, in arrays of the points' shape.
 
     Attributes:
         distance: float64; inf without triangles, NaN for a point that is none.
-        prim_id: int32, triangle within its mesh, of those equally near the first; -1 without one.
+        prim_id: int32, face within its mesh, of those equally near the first; -1 without one.
         geom_id: int32, mesh; -1 without one.
-        position: float64, shape (..., 3), the nearest point of the triangle; NaN without one.
-        uv: float64, shape (..., 2), weights of the triangle's vertices 1 and 2 there (Embree's order).
+        position: float64, shape (..., 3), the nearest point of the face; NaN without one.
+        uv: float64, shape (..., 2), weights of the triangle's vertices 1 and 2 there (Embree's order), on quads as
+            those of :attr:`Hits.uv`.
 
     >>> import ropewalk
     >>> scene = ropewalk.Scene([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -79,7 +80,7 @@ class PointMethods:
     def closest_point(
         self, points: ArrayLike, *, threads: int = 0, strict: bool = False
     ) -> ClosestPoints:
-        """The nearest triangle of each point, and the nearest point of it.
+        """The nearest face of each point, and the nearest point of it; a quad is its two triangles.
 
         Args:
             points: shape (..., 3), any numeric dtype, used in float64.
@@ -90,8 +91,8 @@ class PointMethods:
         Distances are in units of the vertices. Faces without area are never the nearest.
 
         Raises:
-            ArgumentError: points of another shape; a scene that holds other primitives than triangles, or
-                instances.
+            ArgumentError: points of another shape; a scene that holds other primitives than triangles and quads,
+                or instances.
             ArgumentTypeError: points that are no real numbers.
             InvalidPointError: with ``strict``, the first such point.
             KeyboardInterrupt: Ctrl-C stops a query within a fraction of a second.

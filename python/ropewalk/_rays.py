@@ -70,15 +70,15 @@ class RayMethods:
             t_min: smallest accepted parameter, in lengths of the direction: a number, or one a ray.
             t_max: largest accepted parameter; both ends are included.
             masks: 32 bits for all rays or a ray; see :meth:`from_meshes`.
-            skip: a primitive that each ray ignores, usually the one that it leaves: ``prim_id`` of a
+            skip: a primitive that each ray ignores, all of it, usually the one that it leaves: ``prim_id`` of a
                 scene of one mesh, a pair ``(prim_id, geom_id)``, or the :class:`Hits` that the rays
                 start at. -1 ignores nothing.
             start: cells from which the rays may be walked: ``hits.cell`` of the hits that they start at,
                 those hits, or ``walker.cell``. A hint for short rays, used where it pays: it changes no
                 answer, also if it is wrong.
             faces: which sides are hit: ``"both"``, ``"front"``, the side from which vertices run
-                counter-clockwise, or ``"back"``; rays pass through the other one. Scenes of triangles alone
-                have a choice.
+                counter-clockwise, or ``"back"``; rays pass through the other one. Scenes of triangles and
+                quads alone have a choice.
             threads: threads of this call; 0 is one a processor that this process may use.
             strict: refuse rays that can hit nothing, instead of counting them in a warning.
 
@@ -154,7 +154,7 @@ class RayMethods:
         threads: int = 0,
         strict: bool = False,
     ) -> HitLists:
-        """Every hit of each ray, in order, each once.
+        """Every hit of each ray, in order; each primitive at most once, where the ray first hits it.
 
         Arguments and errors are those of :meth:`closest_hit`.
 

@@ -28,13 +28,13 @@ class Report:
     sample_rays: int
     #: Number of meshes.
     meshes: int
-    #: Number of primitives, degenerate ones included.
+    #: Number of primitives, degenerate ones included; a quad is one.
     primitives: int
-    #: Primitives without area; they are kept and never hit.
+    #: Primitives without area, of quads their triangles; they are kept and never hit.
     degenerate: int
-    #: References to primitives in leaves.
+    #: References to primitives in leaves, of quads to their triangles.
     references: int
-    #: References per primitive; 0 for an empty scene.
+    #: References per primitive, of quads per triangle; 0 for an empty scene.
     duplication: float
     #: Inner nodes of the binary tree.
     inner_nodes: int

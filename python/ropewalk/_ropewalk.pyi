@@ -25,7 +25,15 @@ _F64 = NDArray[np.float64]
 _I32 = NDArray[np.int32]
 _I64 = NDArray[np.int64]
 _U32 = NDArray[np.uint32]
-_State = tuple[NDArray[np.uint8], NDArray[np.uint64], _F32, list[int], list[int], tuple[str, str]]
+_State = tuple[
+    NDArray[np.uint8],
+    NDArray[np.uint64],
+    _F32,
+    list[int],
+    list[int],
+    tuple[str, str],
+    NDArray[np.uint8] | None,
+]
 
 def cells_of(core: Core, points: NDArray[np.float64], threads: int) -> _I64: ...
 def walk(
@@ -137,8 +145,7 @@ class DoubleCore:
 class Core:
     @staticmethod
     def build(
-        vertices: list[_F32],
-        faces: list[_U32],
+        meshes: list[tuple[_F32, _U32] | _F32],
         masks: list[int],
         plan: tuple[str, str],
         threads: int,
@@ -164,6 +171,7 @@ class Core:
         masks: list[int],
         plan: tuple[str, str],
         threads: int,
+        quads: NDArray[np.uint8] | None = None,
     ) -> Core: ...
     def state(self) -> _State: ...
     @property

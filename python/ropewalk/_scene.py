@@ -21,6 +21,7 @@ from ._arrays import (
     as_masks,
     as_rows,
     as_threads,
+    moved,
 )
 from ._errors import ArgumentError, ArgumentTypeError, PrecisionWarning
 from ._file import Saved
@@ -29,6 +30,7 @@ from ._points import PointMethods
 from ._rays import RayMethods, RaySample, as_sample
 from ._report import Report, plural, report_of, size_of
 from ._ropewalk import Core, DoubleCore, DoubleRays, Rays, default_threads
+from ._shapes import Shapes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,13 +46,18 @@ _ALL_BITS = 0xFFFF_FFFF
 #: Coordinates in float64 beyond this would overflow in products.
 _LARGEST = 1e100
 
+#: Vertices as given, faces, and what arguments of the mesh are called.
+_Mesh = tuple[np.ndarray, np.ndarray, str]
+
 
 class Scene(Saved, RayMethods, PointMethods):
-    """Triangles that rays can be cast at. A scene never changes and can be used by many threads.
+    """Triangles and quads that rays can be cast at. A scene never changes and can be used by many threads.
 
     Args:
         vertices: shape (V, 3), any numeric dtype.
-        faces: shape (F, 3), integers from 0 to V - 1; face ``i`` is primitive ``i``.
+        faces: shape (F, 3) for triangles or (F, 4) for quads, integers from 0 to V - 1; face ``i`` is primitive
+            ``i``. A quad (a, b, c, d) is the triangles (a, b, c) and (a, c, d), and one primitive: a ray hits it once
+            at most, at the first hit of the two. One whose fourth index is its third is a triangle.
         preset: ``"fast"``, ``"balanced"`` or ``"best"``: how long to build for how fast a tree;
             ``"compact"`` for a small one.
         cost_model: what the build minimises: ``"surface_area"`` (MacDonald and Booth 1990), the measure of rays that
@@ -119,7 +126,7 @@ class Scene(Saved, RayMethods, PointMethods):
     @classmethod
     def from_meshes(
         cls,
-        meshes: Iterable[tuple[ArrayLike, ArrayLike]],
+        meshes: Iterable[tuple[ArrayLike, ArrayLike] | Shapes],
         *,
         masks: ArrayLike | None = None,
         preset: str = "balanced",
@@ -133,11 +140,13 @@ class Scene(Saved, RayMethods, PointMethods):
         """A scene of several meshes; hits name the mesh (``geom_id``) and the face in it (``prim_id``).
 
         Args:
-            meshes: pairs of vertices (V, 3) and faces (F, 3), as for :class:`Scene`.
+            meshes: pairs of vertices (V, 3) and faces (F, 3) or (F, 4), as for :class:`Scene`; or
+                :class:`Spheres`, :class:`Cones` or :class:`Cylinders`, which make the scene one of single precision.
             masks: 32 bits a mesh, all set by default. A ray hits a mesh if they have a bit in common.
 
         Raises:
-            ArgumentError, ArgumentTypeError, OutOfMemoryError: as :class:`Scene`.
+            ArgumentError, ArgumentTypeError, OutOfMemoryError: as :class:`Scene`; ArgumentError also for
+                ``precision="double"`` with other shapes than triangles and quads.
 
         >>> import ropewalk
         >>> a = ([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -147,20 +156,27 @@ class Scene(Saved, RayMethods, PointMethods):
         array(1, dtype=int32)
         >>> scene.closest_hit([0.2, 0.2, 5], [0, 0, -1], masks=1).geom_id
         array(0, dtype=int32)
+        >>> scene = ropewalk.Scene.from_meshes([a, ropewalk.Spheres([[0.2, 0.2, -4]], 1)])
+        >>> scene.all_hits([0.2, 0.2, 5], [0, 0, -1]).geom_id
+        array([0, 1], dtype=int32)
         """
-        checked = []
+        checked: list[_Mesh | Shapes] = []
         try:
             pairs = list(meshes)
         except TypeError:
             raise ArgumentTypeError(
-                f"meshes: expected pairs of arrays, found {type(meshes).__name__}", "meshes"
+                f"meshes: expected pairs of arrays or shapes, found {type(meshes).__name__}", "meshes"
             ) from None
         for i, pair in enumerate(pairs):
+            if isinstance(pair, Shapes):
+                checked.append(pair)
+                continue
             try:
                 vertices, faces = pair
             except (TypeError, ValueError):
                 raise ArgumentTypeError(
-                    f"meshes[{i}]: expected a pair (vertices, faces), found {type(pair).__name__}",
+                    f"meshes[{i}]: expected a pair (vertices, faces), Spheres, Cones or Cylinders, found "
+                    f"{type(pair).__name__}",
                     "meshes",
                     i,
                 ) from None
@@ -308,7 +324,7 @@ class Scene(Saved, RayMethods, PointMethods):
 
     @property
     def mesh_sizes(self) -> NDArray[np.int64]:
-        """Number of primitives of each mesh.
+        """Number of primitives of each mesh; a quad is one.
 
         >>> import ropewalk
         >>> ropewalk.load("spd:tetra:2").mesh_sizes
@@ -375,7 +391,8 @@ class Scene(Saved, RayMethods, PointMethods):
             return _restore_instances, (type(self), *self._placed, core.masks)
         if isinstance(core, DoubleCore):
             return _restore_double, (type(self), *core.meshes(), core.starts, core.masks, core.plan)
-        return _restore, (type(self), *core.state())
+        *state, quads = core.state()
+        return _restore, (type(self), *state) if quads is None else (type(self), *state, quads)
 
 
 def load(
@@ -440,10 +457,11 @@ def _restore(
     starts: list[int],
     masks: list[int],
     plan: tuple[str, str],
+    quads: NDArray[np.uint8] | None = None,
 ) -> Scene:
     scene = kind.__new__(kind)
     threads = default_threads()
-    scene._adopt(Core.from_state(kinds, ends, numbers, starts, masks, plan, threads))
+    scene._adopt(Core.from_state(kinds, ends, numbers, starts, masks, plan, threads, quads))
     return scene
 
 
@@ -468,7 +486,7 @@ def _restore_double(
 
 
 def _build(
-    meshes: list[tuple[np.ndarray, np.ndarray, str]],
+    meshes: list[_Mesh | Shapes],
     masks: list[int],
     plan: tuple[str, str],
     precision: str,
@@ -482,27 +500,45 @@ def _build(
         raise ArgumentError(
             f"precision: expected 'auto', 'single' or 'double', found {precision!r}", "precision"
         )
-    vertices = [as_float32(mesh[0]) for mesh in meshes]
-    moved = [_moved(mesh[0], rounded) for mesh, rounded in zip(meshes, vertices)]
+    flat = [mesh for mesh in meshes if not isinstance(mesh, Shapes)]
+    has_shapes = len(flat) < len(meshes)
+    if has_shapes and precision == "double":
+        raise ArgumentError(
+            "precision: spheres and cones are of single precision; expected 'auto' or 'single', found 'double' "
+            "(move the scene to the origin, or make one of the meshes alone)",
+            "precision",
+        )
+    vertices = [as_float32(mesh[0]) for mesh in flat]
+    shifts = [moved(mesh[0], rounded) for mesh, rounded in zip(flat, vertices)]
     if precision == "auto":
-        precision = "double" if any(by > _PRECISION * size for by, size in moved) else "single"
-    if precision == "double" and sum(len(mesh[1]) for mesh in meshes) > 0:
-        return _build_double(meshes, masks, plan, threads, progress, limit, rays)
-    for (by, size), (_, corners, name) in zip(moved, meshes):
-        if len(corners) and _PRECISION * size < by < np.inf:
+        far = any(by > _PRECISION * size for by, size in shifts)
+        precision = "double" if far and not has_shapes else "single"
+    if precision == "double" and sum(len(mesh[1]) for mesh in flat) > 0:
+        return _build_double(flat, masks, plan, threads, progress, limit, rays)
+    instead = (
+        "move the scene to the origin, since spheres and cones are of single precision"
+        if has_shapes
+        else "leave out precision='single'"
+    )
+    notes = [(shift, f"{mesh[2]}vertices") for shift, mesh in zip(shifts, flat) if len(mesh[1])]
+    notes += [(m._moved, f"meshes[{i}]") for i, m in enumerate(meshes) if isinstance(m, Shapes)]
+    for (by, size), name in notes:
+        if _PRECISION * size < by < np.inf:
             warnings.warn(
-                f"{name}vertices: rounding to float32 moves vertices by up to {by:.3g}, where the "
-                f"diagonal of all is {size:.3g}; leave out precision='single'",
+                f"{name}: rounding to float32 moves vertices by up to {by:.3g}, where the "
+                f"diagonal of all is {size:.3g}; {instead}",
                 PrecisionWarning,
                 stacklevel=4,
             )
-    faces, sample = [mesh[1] for mesh in meshes], as_sample(rays, Rays, stacklevel=5)
+    rounded = iter(vertices)
+    parts = [m._numbers if isinstance(m, Shapes) else (next(rounded), m[1]) for m in meshes]
+    sample = as_sample(rays, Rays, stacklevel=5)
     with _progress(progress) as show:
-        return Core.build(vertices, faces, masks, plan, threads, show, limit, sample)
+        return Core.build(parts, masks, plan, threads, show, limit, sample)
 
 
 def _build_double(
-    meshes: list[tuple[np.ndarray, np.ndarray, str]],
+    meshes: list[_Mesh],
     masks: list[int],
     plan: tuple[str, str],
     threads: int,
@@ -511,7 +547,10 @@ def _build_double(
     rays: RaySample | None,
 ) -> DoubleCore:
     vertices, faces, starts, first = [], [], [0], 0
+    width = max(mesh[1].shape[1] for mesh in meshes)
     for given, corners, name in meshes:
+        if corners.shape[1] < width:
+            corners = np.concatenate([corners, corners[:, 2:]], axis=1)
         array = as_float64(given)
         wrong = ~(np.abs(array) <= _LARGEST)
         if wrong.any():
@@ -544,10 +583,7 @@ def _plan(preset: str, cost_model: str) -> tuple[str, str]:
     return preset, cost_model
 
 
-def _mesh(
-    vertices: ArrayLike, faces: ArrayLike, name: str
-) -> tuple[np.ndarray, np.ndarray, str]:
-    """Vertices as given, faces, and what arguments of the mesh are called."""
+def _mesh(vertices: ArrayLike, faces: ArrayLike, name: str) -> _Mesh:
     given = as_rows(vertices, f"{name}vertices")
     return given, as_faces(faces, f"{name}faces", len(given)), name
 
@@ -580,25 +616,6 @@ def _matrix(matrix: ArrayLike | None, name: str, index: int) -> np.ndarray:
             index,
         )
     return array[:3]
-
-
-def _moved(given: np.ndarray, rounded: np.ndarray) -> tuple[float, float]:
-    """By how much rounding moves vertices at most, and the diagonal of all; bit by bit, to spare memory.
-
-    Infinite for numbers beyond float32, 0 where a number is none.
-    """
-    kind, size = given.dtype.kind, given.dtype.itemsize
-    if (kind == "f" and size <= 4) or (kind in "iu" and size <= 2) or not len(given):
-        return 0.0, 0.0
-    if not np.isfinite(rounded).all():
-        return (np.inf if np.isfinite(given).all() else 0.0), 0.0
-    span = rounded.max(axis=0).astype(np.float64) - rounded.min(axis=0)
-    step, worst = 1 << 16, 0.0
-    for start in range(0, len(given), step):
-        part = slice(start, start + step)
-        worst = max(worst, float(np.abs(given[part] - rounded[part].astype(np.float64)).max()))
-    return worst, float(np.linalg.norm(span))
-
 
 
 @contextmanager

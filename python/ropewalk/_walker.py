@@ -73,10 +73,10 @@ class Events:
 
 
 class Walker:
-    """Many particles in a scene of triangles, each moved along segments of its own.
+    """Many particles in a scene of triangles and quads, each moved along segments of its own.
 
     Args:
-        scene: the scene; it must hold nothing but triangles.
+        scene: the scene; it must hold nothing but triangles and quads.
         positions: shape (N, 3), rounded to float32.
         threads: threads of each call; 0 is one a processor that this process may use.
 
@@ -84,7 +84,8 @@ class Walker:
     once. Every face that it crosses is reported, exactly once, and it is decided without rounding which
     these are: also where segments end in faces, on edges or in vertices, and where particles turn there,
     none is missed or counted twice. A point in a face counts as on the side to which a step along +x
-    leads (+y, +z if the face is parallel to that). No answer depends on the number of threads. Threads can share
+    leads (+y, +z if the face is parallel to that). A quad is crossed as its two triangles are: one that is
+    not flat can be entered and left by one segment. No answer depends on the number of threads. Threads can share
     a scene but not a walker: each call moves its particles.
 
     Raises:

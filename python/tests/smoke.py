@@ -108,6 +108,16 @@ def calls():
     assert before == 5000 and len(events.particle_id) == len(events) == events.counts.sum()
     assert not walker.stopped.any() and (walker.cell >= -1).all() and repr(walker) and repr(events)
 
+    balls = ropewalk.Spheres(vertices[:9], 0.1)
+    sticks = [ropewalk.Cones(vertices[:9], vertices[9:18], 0.1, 0), ropewalk.Cylinders(vertices[:9], vertices[9:18], 0.1)]
+    mixed = ropewalk.Scene.from_meshes([(vertices, faces), balls, *sticks])
+    assert mixed.mesh_sizes.tolist() == [len(faces), 9, 9, 9] and len(balls) == 9 and repr(sticks[0]) and repr(balls)
+    assert (balls.centers == sticks[0].base).all() and (balls.radii == sticks[1].apex_radius).all()
+    assert (sticks[0].apex == sticks[1].apex).all() and (sticks[0].base_radius > 0).all()
+    assert (mixed.occluded(origins, directions) >= hits.hit).all()
+    quads = ropewalk.Scene(vertices, np.concatenate([faces[: len(faces) // 2], faces[len(faces) // 2 :, 2:]], axis=1))
+    assert (quads.closest_hit(origins, directions).t == hits.t).all() and len(quads) == len(faces) // 2
+
     placed = ropewalk.Scene.from_instances([(ropewalk.Scene(vertices, faces, precision="double"), None)])
     assert (placed.occluded(origins, directions) == hits.hit).all()
     for shown in (repr(scene), repr(placed), scene._repr_html_(), repr(scene.report), str(scene.report)):

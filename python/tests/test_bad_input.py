@@ -64,6 +64,69 @@ def test_unsigned_faces_that_name_no_vertex():
     refused(ArgumentError, "faces", 0, "18446744073709551615", lambda: ropewalk.Scene(V, faces))
 
 
+def test_quads_that_name_no_vertex():
+    for index in (-1, 4, 2**40):
+        faces = np.int64([[0, 1, 2, 3], [0, 2, 3, 3]])
+        faces[1, 3] = index
+        for precision in ("single", "double"):
+            bad = lambda: ropewalk.Scene(V, faces, precision=precision)  # noqa: B023, E731
+            refused(ArgumentError, "faces", 1, f"vertex {index}", bad)
+    with pytest.raises(ArgumentError, match="third index twice"):
+        ropewalk.Scene(V, [[0, 1, 2, -1]])
+    refused(ArgumentTypeError, "faces", None, "integers", lambda: ropewalk.Scene(V, np.zeros((1, 4))))
+
+
+BAD_POINT = [np.nan, np.inf, 1e39]
+
+
+@pytest.mark.parametrize("value", BAD_POINT)
+def test_shapes_that_are_not_finite(value):
+    good, bad = np.zeros((3, 3)), np.zeros((3, 3))
+    bad[1, 2] = value
+    text = "expected finite numbers"
+    refused(ArgumentError, "centers", 1, text, lambda: ropewalk.Spheres(bad, 1))
+    refused(ArgumentError, "base", 1, text, lambda: ropewalk.Cones(bad, good, 1, 1))
+    refused(ArgumentError, "apex", 1, text, lambda: ropewalk.Cylinders(good, bad, 1))
+    reach = np.full((2, 3), 3e38)
+    refused(ArgumentError, "centers", 1, "beyond", lambda: ropewalk.Spheres(reach, [1e37, 3e38]))
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, 1e39, 1e-60])
+def test_radii_of_nothing(value):
+    o, u = np.zeros((3, 3)), np.ones((3, 3))
+    refused(ArgumentError, "radii", 2, "expected a finite", lambda: ropewalk.Spheres(o, [1, 1, value]))
+    refused(ArgumentError, "radii", None, "expected a finite", lambda: ropewalk.Spheres(o, value))
+    refused(ArgumentError, "radius", 0, "expected", lambda: ropewalk.Cylinders(o, u, [value, 1, 1]))
+    if 0 <= value < 1:
+        refused(ArgumentError, "base_radius", 1, "above 0", lambda: ropewalk.Cones(o, u, [1, value, 1], 0))
+        assert len(ropewalk.Cones(o, u, value, 1)) == 3
+    else:
+        refused(ArgumentError, "apex_radius", 1, "finite", lambda: ropewalk.Cones(o, u, 1, [1, value, 1]))
+
+
+def test_shapes_of_a_wrong_shape():
+    o = np.zeros((3, 3))
+    refused(ArgumentError, "centers", None, "shape", lambda: ropewalk.Spheres(np.zeros((3, 4)), 1))
+    refused(ArgumentError, "radii", None, "shape", lambda: ropewalk.Spheres(o, [1, 1]))
+    refused(ArgumentError, "radii", None, "shape", lambda: ropewalk.Spheres(o, np.ones((3, 1))))
+    refused(ArgumentError, "apex", None, "shape", lambda: ropewalk.Cones(o, o[:2], 1, 1))
+    refused(ArgumentError, "apex_radius", None, "shape", lambda: ropewalk.Cones(o, o, 1, np.ones(4)))
+    refused(ArgumentTypeError, "centers", None, "real numbers", lambda: ropewalk.Spheres("text", 1))
+    refused(ArgumentTypeError, "radii", None, "real numbers", lambda: ropewalk.Spheres(o, [True] * 3))
+    refused(ArgumentTypeError, "radius", None, "real numbers", lambda: ropewalk.Cylinders(o, o, 1j))
+    with pytest.raises(ArgumentTypeError, match=r"meshes\[1\]: expected a pair .* Spheres") as caught:
+        ropewalk.Scene.from_meshes([(V, F), 7])
+    assert caught.value.index == 1
+
+
+def test_spheres_in_double_precision():
+    for made in (ropewalk.Spheres([[0, 0, 0]], 1), ropewalk.Cylinders([[0, 0, 0]], [[0, 0, 1]], 1)):
+        refused(
+            ArgumentError, "precision", None, "move the scene",
+            lambda: ropewalk.Scene.from_meshes([made, (V, F)], precision="double"),  # noqa: B023
+        )  # fmt: skip
+
+
 def test_faces_without_vertices():
     refused(ArgumentError, "faces", 0, "no vertices", lambda: ropewalk.Scene([], F))
 
@@ -73,7 +136,7 @@ def test_vertices_of_a_wrong_shape(shape):
     refused(ArgumentError, "vertices", None, "shape", lambda: ropewalk.Scene(np.zeros(shape), F))
 
 
-@pytest.mark.parametrize("shape", [(), (3,), (2, 4), (1, 2, 3)])
+@pytest.mark.parametrize("shape", [(), (3,), (2, 2), (2, 5), (1, 2, 3)])
 def test_faces_of_a_wrong_shape(shape):
     faces = np.zeros(shape, np.int32)
     refused(ArgumentError, "faces", None, "shape", lambda: ropewalk.Scene(V, faces))

@@ -80,7 +80,7 @@ def test_everything_public_is_exported_and_documented():
 
 MODULES = ["ropewalk"] + [
     f"ropewalk._{name}"
-    for name in ("file", "hits", "mesh", "points", "rays", "report", "scene", "walker")
+    for name in ("file", "hits", "mesh", "points", "rays", "report", "scene", "shapes", "walker")
 ]
 MODULES += ["ropewalk.compat"] + [
     f"ropewalk.compat.{name}"

@@ -1,6 +1,7 @@
 //! A scene with its tree, and the batch queries.
 
 use crate::error::{self, Failure};
+use crate::faces::{Faces, MeshFaces, Rows, once};
 use crate::figures::Build;
 use crate::rays::{Invalid, Rays, View, one};
 use crate::surface::{self, Surface};
@@ -12,7 +13,7 @@ use pyo3::types::PyDict;
 use ropewalk::build::{BuildSettings, CostChoice, Monitor, Preset, RaySample};
 use ropewalk::kernel::{AllHits, BatchCaster, HitFilter};
 use ropewalk::point::Cell;
-use ropewalk::primitive::{Primitive, Triangle};
+use ropewalk::primitive::{Cone, Primitive, Sphere, Triangle};
 use ropewalk::ray::PreparedRay;
 use ropewalk::wide::WideTree;
 use ropewalk::{Geometry, GeometryError, Hit, Ray, Shape, Sides};
@@ -42,8 +43,7 @@ pub struct Core {
     pub(crate) geometry: Geometry,
     pub(crate) tree: WideTree,
     pub(crate) report: Build,
-    /// The first primitive of each mesh, and the number of primitives.
-    pub(crate) starts: Vec<u32>,
+    pub(crate) faces: Faces,
     /// Masks of the meshes.
     pub(crate) masks: Vec<u32>,
     pub(crate) preset: Preset,
@@ -70,18 +70,31 @@ impl Monitor for Watch<'_> {
 /// Parameters and primitives of a block.
 type TAndPrim<'a> = (&'a mut [f32], &'a mut [i32]);
 
-/// Vertices and faces.
-type Mesh<'a> = (&'a [[f32; 3]], &'a [[u32; 3]]);
+/// A mesh as Python gives it.
+#[derive(FromPyObject)]
+pub enum Given<'py> {
+    /// Vertices, and faces of three or four corners.
+    Mesh(PyReadonlyArray2<'py, f32>, PyReadonlyArray2<'py, u32>),
+    /// Rows of four numbers for spheres (centre, radius), of eight for cones (base, apex, their radii).
+    Shapes(PyReadonlyArray2<'py, f32>),
+}
 
-/// A geometry, the first primitive of each mesh, and how many primitives there are.
-type Parts = (Geometry, Vec<u32>);
+/// A mesh.
+enum Mesh<'a> {
+    Faces(&'a [[f32; 3]], Rows<'a>),
+    Spheres(&'a [[f32; 4]]),
+    Cones(&'a [[f32; 8]]),
+}
+
+/// A geometry and its faces.
+type Parts = (Geometry, Faces);
 
 /// Parameters, primitives and meshes of hits, how many rays were invalid and which was the first.
 type Answer<'py> =
     (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<i32>>, Bound<'py, PyArray1<i32>>, usize, usize);
 
 /// The same in rows that begin at the first array's entries.
-type Rows<'py> = (
+type Lists<'py> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<f32>>,
     Bound<'py, PyArray1<i32>>,
@@ -92,13 +105,12 @@ type Rows<'py> = (
 
 #[pymethods]
 impl Core {
-    /// Builds a tree over meshes: vertices, faces and a mask of each.
+    /// Builds a tree over meshes with a mask each.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, masks, plan, threads, progress=None, memory_limit=None, rays=None))]
+    #[pyo3(signature = (meshes, masks, plan, threads, progress=None, memory_limit=None, rays=None))]
     fn build(
         py: Python<'_>,
-        vertices: Vec<PyReadonlyArray2<'_, f32>>,
-        faces: Vec<PyReadonlyArray2<'_, u32>>,
+        meshes: Vec<Given<'_>>,
         masks: Vec<u32>,
         plan: (String, String),
         threads: usize,
@@ -107,18 +119,15 @@ impl Core {
         rays: Option<&Rays>,
     ) -> PyResult<Core> {
         let plan = Plan::new(&plan)?.with_rays(sample(py, rays)?);
-        let one_mesh = vertices.len() == 1;
-        let mut meshes = Vec::with_capacity(vertices.len());
-        for (vertices, faces) in vertices.iter().zip(&faces) {
-            let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
-            let (faces, _) = faces.as_slice()?.as_chunks::<3>();
-            meshes.push((vertices, faces));
-        }
+        let one_mesh = meshes.len() == 1;
+        let meshes: Vec<Mesh<'_>> = meshes.iter().map(Given::view).collect::<PyResult<_>>()?;
+        let faces: Vec<MeshFaces<'_>> = meshes.iter().map(Mesh::faces).collect();
+        let faces = Faces::of_meshes(&faces);
         // Before the triangles are copied; of is asked again, which costs nothing.
-        let count: usize = meshes.iter().map(|mesh| mesh.1.len()).sum();
-        left_for_build(memory_limit, 0, count)
+        let count = meshes.iter().map(|mesh| mesh.faces().primitive_count()).sum();
+        left_for_build(memory_limit, faces.bytes() as u64, count)
             .map_err(|failure| failure.into_exception(one_mesh))?;
-        let make = |_: &Watch<'_>| triangles(&meshes);
+        let make = |_: &Watch<'_>| Ok((geometry_of(&meshes)?, faces));
         Self::of(py, make, masks, plan, threads, progress, memory_limit, one_mesh)
     }
 
@@ -140,13 +149,14 @@ impl Core {
             let scene = loaded.map_err(Failure::File)?.into_scene();
             let geometry = scene.geometry(FacetPolicy::TwoSided).map_err(Failure::Objects)?;
             let count = geometry.len() as u32;
-            Ok((geometry, vec![0, count]))
+            Ok((geometry, Faces::new(vec![0, count])))
         };
         Self::of(py, make, vec![!0], plan, threads, progress, memory_limit, true)
     }
 
     /// Builds what [`Core::state`] returned.
     #[staticmethod]
+    #[pyo3(signature = (kinds, ends, numbers, starts, masks, plan, threads, quads=None))]
     fn from_state(
         py: Python<'_>,
         kinds: PyReadonlyArray1<'_, u8>,
@@ -156,6 +166,7 @@ impl Core {
         masks: Vec<u32>,
         plan: (String, String),
         threads: usize,
+        quads: Option<PyReadonlyArray1<'_, u8>>,
     ) -> PyResult<Core> {
         let plan = Plan::new(&plan)?;
         let (kinds, ends, numbers) = (kinds.as_slice()?, ends.as_slice()?, numbers.as_slice()?);
@@ -165,10 +176,14 @@ impl Core {
             && starts.first() == Some(&0)
             && starts.last().is_some_and(|&n| n as usize == kinds.len());
         let geometry = state::read(kinds, ends, numbers).filter(|_| sound).ok_or_else(bad)?;
-        Self::of(py, |_| Ok((geometry, starts)), masks, plan, threads, None, None, true)
+        let faces = match &quads {
+            Some(quads) => Faces::with_seconds(&starts, quads.as_slice()?).ok_or_else(bad)?,
+            None => Faces::new(starts),
+        };
+        Self::of(py, |_| Ok((geometry, faces)), masks, plan, threads, None, None, true)
     }
 
-    /// Everything that makes the scene, as arrays and lists.
+    /// Everything that makes the scene, as arrays and lists; the last is None without quads.
     #[allow(clippy::type_complexity)]
     fn state<'py>(
         &self,
@@ -180,17 +195,20 @@ impl Core {
         Vec<u32>,
         Vec<u32>,
         (&'static str, &'static str),
+        Option<Bound<'py, PyArray1<u8>>>,
     ) {
         let (kinds, ends, numbers) = py.detach(|| state::write(&self.geometry));
         let (kinds, ends) = (kinds.into_pyarray(py), ends.into_pyarray(py));
         let plan = plan_of(self.preset, &self.report);
-        (kinds, ends, numbers.into_pyarray(py), self.starts.clone(), self.masks.clone(), plan)
+        let quads = self.faces.seconds().map(|bits| bits.into_pyarray(py));
+        let starts = self.faces.primitive_starts();
+        (kinds, ends, numbers.into_pyarray(py), starts, self.masks.clone(), plan, quads)
     }
 
-    /// The first primitive of each mesh, and the number of primitives.
+    /// The first face of each mesh, and the number of faces.
     #[getter]
     fn starts(&self) -> Vec<u32> {
-        self.starts.clone()
+        self.faces.starts().to_vec()
     }
 
     /// Masks of the meshes.
@@ -216,7 +234,7 @@ impl Core {
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let figures = figures(py, &self.report, self.preset, self.masks.len())?;
         figures.set_item("tree_bytes", self.tree.bytes())?;
-        figures.set_item("geometry_bytes", self.geometry.bytes())?;
+        figures.set_item("geometry_bytes", self.geometry.bytes() + self.faces.bytes())?;
         Ok(figures)
     }
 
@@ -257,7 +275,7 @@ impl Core {
                 }
                 None => drop(caster.closest_hit_into(rays, t, prim)),
             });
-            number(&self.starts, prim, geom);
+            self.faces.number(prim, geom);
             invalid
         };
         let invalid = total(work::for_each(py, threads, tasks, trace)?);
@@ -301,7 +319,7 @@ impl Core {
         Ok((hit.into_pyarray(py), invalid.count, invalid.first))
     }
 
-    /// The number of primitives that each ray hits.
+    /// The number of faces that each ray hits.
     fn count_hits<'py>(
         &self,
         py: Python<'py>,
@@ -315,6 +333,14 @@ impl Core {
         let tasks = blocks(view.count, block).zip(counts.chunks_mut(block)).collect();
         let trace = |(range, counts): (Range<usize>, &mut [i32])| {
             self.block(&view, range, |caster, filter, rays| {
+                if self.faces.has_quads() {
+                    let mut all = AllHits::default();
+                    self.first_of(caster, filter, rays, usize::MAX, &mut all);
+                    for (count, row) in counts.iter_mut().zip(all.offsets.windows(2)) {
+                        *count = (row[1] - row[0]) as i32;
+                    }
+                    return;
+                }
                 let found = match filter {
                     Some(filter) => caster.with_filter(filter).count_hits(rays),
                     None => caster.count_hits(rays),
@@ -334,16 +360,15 @@ impl Core {
         rays: &Rays,
         threads: usize,
         k: Option<usize>,
-    ) -> PyResult<Rows<'py>> {
+    ) -> PyResult<Lists<'py>> {
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;
         let (n, k) = (view.count, k.unwrap_or(usize::MAX));
         let ranges = blocks(n, block(n, threads, BLOCK)).collect();
         let trace = |range: Range<usize>| {
             let mut all = AllHits::default();
-            let invalid = self.block(&view, range, |caster, filter, rays| match filter {
-                Some(filter) => caster.with_filter(filter).first_hits_into(rays, k, &mut all),
-                None => caster.first_hits_into(rays, k, &mut all),
+            let invalid = self.block(&view, range, |caster, filter, rays| {
+                self.first_of(caster, filter, rays, k, &mut all);
             });
             (all, invalid)
         };
@@ -371,7 +396,7 @@ impl Core {
             t.copy_from_slice(&part.t);
             let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
             prim.copy_from_slice(&part.prim_id);
-            number(&self.starts, prim, geom);
+            self.faces.number(prim, geom);
         })?;
         let (t, prim, geom) = (t.into_pyarray(py), prim.into_pyarray(py), geom.into_pyarray(py));
         Ok((offsets.into_pyarray(py), t, prim, geom, invalid.count, invalid.first))
@@ -409,12 +434,15 @@ impl Core {
             let mut lost = 0;
             for (i, value) in range.zip(values.chunks_exact_mut(width)) {
                 value.fill(f32::NAN);
-                let Some(prim) = primitive(&self.starts, prim[i], geom[i]) else { continue };
+                let Some(face) = self.faces.face(prim[i], geom[i]) else { continue };
                 let ray = ray.map_or(i, |ray| ray[i] as usize);
                 let line = (ray < view.count).then(|| view.line(ray));
                 let found = line.is_some_and(|(origin, dir)| {
                     let ray = Ray { origin, dir, t_min: t[i], t_max: t[i] };
-                    surface::look(&self.geometry, surface, &ray, prim, value)
+                    self.faces.primitives(face).any(|prim| {
+                        let on = (prim, self.faces.part(prim), view.sides);
+                        surface::look(&self.geometry, surface, &ray, on, value)
+                    })
                 });
                 lost += usize::from(!found);
             }
@@ -475,20 +503,21 @@ impl Core {
         };
         let job = || {
             let watch = Watch { stop: &stop, done: &done };
-            let (geometry, starts) = make(&watch)?;
-            let memory_limit = left_for_build(memory_limit, 0, geometry.len())?;
+            let (geometry, faces) = make(&watch)?;
+            let table = faces.bytes() as u64;
+            let memory_limit = left_for_build(memory_limit, table, geometry.len())?;
             let settings = BuildSettings { memory_limit, ..settings.clone() };
             let (tree, report) =
                 WideTree::build(&geometry, &settings, &watch).map_err(Failure::Build)?;
-            Ok((geometry, starts, tree, report))
+            Ok((geometry, faces, tree, report))
         };
-        let (geometry, starts, tree, report) = work::watch(py, threads, &stop, show, job)?
+        let (geometry, faces, tree, report) = work::watch(py, threads, &stop, show, job)?
             .map_err(|failure: Failure| failure.into_exception(one_mesh))?;
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        let (report, preset) = (Build::from(&report), plan.preset);
-        Ok(Core { geometry, tree, report, starts, masks, preset })
+        let report = Build { primitives: faces.len(), ..Build::from(&report) };
+        Ok(Core { geometry, tree, report, faces, masks, preset: plan.preset })
     }
 
     /// The geometry.
@@ -496,9 +525,40 @@ impl Core {
         &self.geometry
     }
 
-    /// The first primitive of each mesh, and the number of primitives.
-    pub fn first_primitives(&self) -> &[u32] {
-        &self.starts
+    /// How what is hit is numbered.
+    pub fn faces(&self) -> &Faces {
+        &self.faces
+    }
+
+    /// The first `k` hits of each ray, each face once.
+    fn first_of(
+        &self,
+        caster: BatchCaster<'_>,
+        filter: Option<RayFilter<'_>>,
+        rays: &[Ray],
+        k: usize,
+        all: &mut AllHits,
+    ) {
+        // Of twice as many hits no more than half are seconds of quads.
+        let most = if self.faces.has_quads() { k.saturating_mul(2) } else { k };
+        match filter {
+            Some(filter) => caster.with_filter(filter).first_hits_into(rays, most, all),
+            None => caster.first_hits_into(rays, most, all),
+        }
+        if self.faces.has_quads() {
+            let AllHits { offsets, t, prim_id } = all;
+            let found: Vec<u32> = prim_id.iter().map(|&prim| self.faces.of(prim)).collect();
+            let left = once(
+                offsets,
+                k,
+                |i| u64::from(found[i]),
+                |to, from| {
+                    (t[to], prim_id[to]) = (t[from], prim_id[from]);
+                },
+            );
+            t.truncate(left);
+            prim_id.truncate(left);
+        }
     }
 
     /// The tree.
@@ -563,10 +623,10 @@ impl HitFilter for RayFilter<'_> {
     fn accepts(&self, ray: usize, hit: &Hit) -> bool {
         let ray = self.first + ray;
         let core = self.core;
-        self.skip.is_none_or(|skip| one(skip, ray) != hit.prim_id)
+        self.skip.is_none_or(|skip| one(skip, ray) != core.faces.of(hit.prim_id))
             && self.masks.is_none_or(|masks| {
                 // An altered file may name primitives that are not there.
-                let mesh = core.masks.get(mesh(&core.starts, hit.prim_id));
+                let mesh = core.masks.get(core.faces.mesh(hit.prim_id));
                 one(masks, ray) & mesh.copied().unwrap_or(!0) != 0
             })
             && self.sides.is_none_or(|view| {
@@ -679,42 +739,6 @@ pub fn masks_that_refuse<'a>(
     asked.iter().any(|mask| mask & common == 0).then_some(masks)
 }
 
-/// The primitive numbered through all meshes, the first ones of which are `starts`; `None` for a miss
-/// and for what is not there.
-pub fn primitive(starts: &[u32], prim: i32, geom: i32) -> Option<u32> {
-    let (prim, geom) = (u32::try_from(prim).ok()?, usize::try_from(geom).ok()?);
-    let (start, end) = (*starts.get(geom)?, *starts.get(geom + 1)?);
-    let prim = start.checked_add(prim)?;
-    (prim < end).then_some(prim)
-}
-
-/// The mesh of a primitive.
-pub fn mesh(starts: &[u32], prim: u32) -> usize {
-    if starts.len() == 2 {
-        return 0;
-    }
-    starts.partition_point(|&start| start <= prim) - 1
-}
-
-/// Numbers primitives within their meshes; misses become -1.
-pub fn number(starts: &[u32], prim: &mut [u32], geom: &mut [i32]) {
-    if starts.len() == 2 {
-        for (prim, geom) in prim.iter().zip(geom) {
-            *geom = -i32::from(*prim == u32::MAX);
-        }
-        return;
-    }
-    for (prim, geom) in prim.iter_mut().zip(geom) {
-        if *prim == u32::MAX {
-            *geom = -1;
-            continue;
-        }
-        let mesh = mesh(starts, *prim);
-        *prim -= starts[mesh];
-        *geom = mesh as i32;
-    }
-}
-
 /// What a limit leaves for a build beyond the geometry itself.
 pub fn left_for_build(
     limit: Option<u64>,
@@ -727,30 +751,84 @@ pub fn left_for_build(
     if needed > limit { Err(Failure::Memory { needed, limit }) } else { Ok(Some(limit - geometry)) }
 }
 
-/// The triangles of some meshes.
-fn triangles(meshes: &[Mesh<'_>]) -> Result<Parts, Failure> {
-    let mut geometry = Geometry::new();
-    let mut starts = vec![0];
-    for (mesh, &(vertices, faces)) in meshes.iter().enumerate() {
-        let refuse = |error| Failure::Mesh(mesh, error);
-        if let Some(vertex) = vertices.iter().position(|p| p.iter().any(|x| !x.is_finite())) {
-            return Err(refuse(GeometryError::Vertex { vertex, found: vertices[vertex] }));
+impl Given<'_> {
+    fn view(&self) -> PyResult<Mesh<'_>> {
+        let bad = || error::argument("meshes", None, "arrays of a wrong shape".into());
+        match self {
+            Given::Mesh(vertices, faces) => {
+                let width = faces.as_array().ncols();
+                let faces = Rows::new(faces.as_slice()?, width).ok_or_else(bad)?;
+                Ok(Mesh::Faces(vertices.as_slice()?.as_chunks::<3>().0, faces))
+            }
+            Given::Shapes(rows) => match rows.as_array().ncols() {
+                4 => Ok(Mesh::Spheres(rows.as_slice()?.as_chunks::<4>().0)),
+                8 => Ok(Mesh::Cones(rows.as_slice()?.as_chunks::<8>().0)),
+                _ => Err(bad()),
+            },
         }
-        if meshes.len() == 1 && !faces.is_empty() {
-            geometry = Geometry::from_triangles(vertices, faces).map_err(refuse)?;
-        } else {
-            for (face, corners) in faces.iter().enumerate() {
-                if let Some(&found) = corners.iter().find(|&&i| i as usize >= vertices.len()) {
-                    let vertices = vertices.len();
-                    return Err(refuse(GeometryError::Face { face, found, vertices }));
+    }
+}
+
+impl<'a> Mesh<'a> {
+    fn faces(&self) -> MeshFaces<'a> {
+        match *self {
+            Mesh::Faces(_, rows) => MeshFaces::Rows(rows),
+            Mesh::Spheres(rows) => MeshFaces::Single(rows.len()),
+            Mesh::Cones(rows) => MeshFaces::Single(rows.len()),
+        }
+    }
+}
+
+/// The primitives of some meshes.
+fn geometry_of(meshes: &[Mesh<'_>]) -> Result<Geometry, Failure> {
+    let mut geometry = Geometry::new();
+    for (mesh, given) in meshes.iter().enumerate() {
+        let refuse = |error| Failure::Mesh(mesh, error);
+        match *given {
+            Mesh::Faces(vertices, faces) => {
+                if let Some(vertex) = vertices.iter().position(|p| p.iter().any(|x| !x.is_finite()))
+                {
+                    return Err(refuse(GeometryError::Vertex { vertex, found: vertices[vertex] }));
                 }
-                let vertices = corners.map(|i| vertices[i as usize]);
-                geometry.push(Triangle { vertices }, Sides::Both).map_err(refuse)?;
+                match faces.triangles_alone() {
+                    Some(faces) if meshes.len() == 1 && !faces.is_empty() => {
+                        geometry = Geometry::from_triangles(vertices, faces).map_err(refuse)?;
+                    }
+                    _ => push_faces(&mut geometry, vertices, faces).map_err(refuse)?,
+                }
+            }
+            Mesh::Spheres(rows) => {
+                for &[x, y, z, radius] in rows {
+                    let sphere = Sphere { center: [x, y, z], radius };
+                    geometry.push(sphere, Sides::Both).map_err(refuse)?;
+                }
+            }
+            Mesh::Cones(rows) => {
+                for &[a, b, c, x, y, z, base_radius, apex_radius] in rows {
+                    let (base, apex) = ([a, b, c], [x, y, z]);
+                    let cone = Cone { base, apex, base_radius, apex_radius };
+                    geometry.push(cone, Sides::Both).map_err(refuse)?;
+                }
             }
         }
-        starts.push(geometry.len() as u32);
     }
-    Ok((geometry, starts))
+    Ok(geometry)
+}
+
+/// Adds the triangles of some faces.
+fn push_faces(
+    geometry: &mut Geometry,
+    vertices: &[[f32; 3]],
+    faces: Rows<'_>,
+) -> Result<(), GeometryError> {
+    for (face, corners) in faces.triangles() {
+        if let Some(&found) = corners.iter().find(|&&i| i as usize >= vertices.len()) {
+            return Err(GeometryError::Face { face, found, vertices: vertices.len() });
+        }
+        let vertices = corners.map(|i| vertices[i as usize]);
+        geometry.push(Triangle { vertices }, Sides::Both)?;
+    }
+    Ok(())
 }
 
 /// All of them together.

@@ -3,6 +3,7 @@
 
 use crate::core::{Plan, Watch, blocks, checked, left_for_build, plan_of, split, total, zeros};
 use crate::error::{self, Failure};
+use crate::faces::{Faces, MeshFaces, Part, once};
 use crate::figures::Build;
 use crate::rays::{Arrays, Invalid, View, one};
 use crate::surface::Surface;
@@ -96,16 +97,16 @@ fn rays_of(view: &View<'_, f64>, range: Range<usize>) -> (Vec<DoubleRay>, Invali
 enum Held {
     /// Meshes and the tree over them.
     Meshes(Arc<Object>, Build),
-    /// Objects in their places, which are numbered as meshes are.
-    Instances(Box<InstancedScene>),
+    /// Objects in their places, which are numbered as meshes are, with the faces of each where any has quads.
+    Instances(Box<InstancedScene>, Vec<Arc<Faces>>),
 }
 
 /// Meshes or instances in `f64` and the trees over them. It never changes.
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
 pub struct DoubleCore {
     held: Held,
-    /// The first primitive of each mesh, and the number of primitives.
-    starts: Vec<u32>,
+    /// Those of all meshes, or of all instances.
+    faces: Arc<Faces>,
     /// Masks of the meshes.
     masks: Vec<u32>,
     preset: Preset,
@@ -122,7 +123,7 @@ type TAndPrim<'a> = (&'a mut [f64], &'a mut [i32]);
 type Mesh<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
 
 /// The same in rows that begin at the first array's entries.
-type Rows<'py> = (
+type Lists<'py> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<i32>>,
@@ -152,14 +153,18 @@ impl DoubleCore {
         let plan = Plan::new(&plan)?;
         let arrays = rays.map(|rays| rays.0.borrow(py)).transpose()?;
         let view = arrays.as_ref().map(|arrays| arrays.view()).transpose()?;
-        let sound = starts.len() == masks.len() + 1 && starts.is_sorted();
-        let count = faces.as_slice()?.len() / 3;
-        if !sound || starts.first() != Some(&0) || starts.last().map(|&n| n as usize) != Some(count)
-        {
-            return Err(error::argument("starts", None, "they do not fit the faces".into()));
+        let bad = || error::argument("starts", None, "they do not fit the faces".into());
+        let width = faces.as_array().ncols();
+        let rows = crate::faces::Rows::new(faces.as_slice()?, width).ok_or_else(bad)?;
+        let sound = starts.len() == masks.len() + 1
+            && starts.is_sorted()
+            && starts.first() == Some(&0)
+            && starts.last().is_some_and(|&n| n as usize == rows.len());
+        if !sound {
+            return Err(bad());
         }
         let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
-        let (faces, _) = faces.as_slice()?.as_chunks::<3>();
+        let faces = Faces::of_meshes(&[MeshFaces::Rows(rows)]).with_starts(starts);
         let (settings, preset) = (plan.settings(threads), plan.preset);
         let (stop, done) = (AtomicBool::new(false), AtomicU64::new(0));
         let show = |py: Python<'_>| match &progress {
@@ -170,10 +175,19 @@ impl DoubleCore {
         };
         let job = || {
             // The scene keeps vertices and faces; the build works on triangles of its own.
-            let kept = size_of_val(vertices) + size_of_val(faces);
-            let memory_limit = left_for_build(memory_limit, kept as u64, faces.len())?;
+            let count = rows.triangle_count();
+            let kept = size_of_val(vertices) + count * size_of::<[u32; 3]>() + faces.bytes();
+            let memory_limit = left_for_build(memory_limit, kept as u64, count)?;
             let settings = BuildSettings { memory_limit, ..settings.clone() };
-            let geometry = DoubleGeometry::from_triangles(vertices.to_vec(), faces.to_vec())
+            let triangles = match rows.triangles_alone() {
+                Some(triangles) => triangles.to_vec(),
+                None => {
+                    let mut cut = Vec::with_capacity(count);
+                    cut.extend(rows.triangles().map(|(_, corners)| corners));
+                    cut
+                }
+            };
+            let geometry = DoubleGeometry::from_triangles(vertices.to_vec(), triangles)
                 .map_err(Failure::Double)?;
             let rays = view.map_or_else(RaySample::default, |view| {
                 geometry.ray_sample(&rays_of(&view, 0..view.count).0)
@@ -187,8 +201,8 @@ impl DoubleCore {
         if let Some(progress) = &progress {
             progress.call1(py, (1.0,))?;
         }
-        let held = Held::Meshes(Arc::new(object), Build::from(&report));
-        Ok(DoubleCore { held, starts, masks, preset })
+        let report = Build { primitives: faces.len(), ..Build::from(&report) };
+        Ok(DoubleCore::of(object, report, (faces, masks), preset))
     }
 
     /// Places objects made by [`DoubleCore::build`]: twelve numbers an instance are the rows of its matrix.
@@ -205,7 +219,7 @@ impl DoubleCore {
             return Err(error::argument("instances", None, "arrays differ in length".into()));
         }
         let mut instances = Vec::with_capacity(objects.len());
-        let (mut starts, mut next) = (vec![0], 0u64);
+        let (mut starts, mut next, mut triangles) = (vec![0], 0u64, 0u64);
         for (i, (core, m)) in objects.iter().zip(rows).enumerate() {
             let refuse = |message: String| {
                 error::argument("instances", Some(i), format!("instances[{i}]: {message}"))
@@ -216,12 +230,17 @@ impl DoubleCore {
             let row = |r: usize| [m[4 * r], m[4 * r + 1], m[4 * r + 2], m[4 * r + 3]];
             let transform = Transform::new([row(0), row(1), row(2)])
                 .map_err(|error| refuse(format!("matrix: {error}")))?;
-            next += object.geometry.len() as u64;
-            if next > i32::MAX as u64 {
+            next += core.faces.len() as u64;
+            triangles += object.geometry.len() as u64;
+            if triangles > i32::MAX as u64 {
                 return Err(refuse("more than 2^31 - 1 primitives, all instances counted".into()));
             }
             starts.push(next as u32);
             instances.push(Instance { object: object.clone(), transform });
+        }
+        let mut of: Vec<Arc<Faces>> = objects.iter().map(|core| core.faces.clone()).collect();
+        if !of.iter().any(|faces| faces.has_quads()) {
+            of.clear();
         }
         drop(objects);
         let stop = AtomicBool::new(false);
@@ -229,29 +248,40 @@ impl DoubleCore {
         let scene = work::watch(py, threads, &stop, |_| Ok(()), job)?
             .map_err(|error| error::argument("instances", None, error.to_string()))?;
         Ok(DoubleCore {
-            held: Held::Instances(Box::new(scene)),
-            starts,
+            held: Held::Instances(Box::new(scene), of),
+            faces: Arc::new(Faces::new(starts)),
             masks,
             preset: Preset::Balanced,
         })
     }
 
-    /// Vertices and faces, from which [`DoubleCore::build`] makes the same again.
+    /// Vertices and faces, of four corners if any are quads, from which [`DoubleCore::build`] makes the same again.
     fn meshes<'py>(&self, py: Python<'py>) -> PyResult<Mesh<'py>> {
         let Held::Meshes(object, _) = &self.held else {
             return Err(error::other("instances have no mesh of their own".into()));
         };
-        let (vertices, faces) = (object.geometry.vertices(), object.geometry.faces());
+        let (vertices, triangles) = (object.geometry.vertices(), object.geometry.faces());
         let vertices = PyArray1::from_slice(py, vertices.as_flattened());
-        let faces = PyArray1::from_slice(py, faces.as_flattened());
-        let rows = |len: usize| [len / 3, 3];
-        Ok((vertices.reshape(rows(vertices.len()?))?, faces.reshape(rows(faces.len()?))?))
+        let vertices = vertices.reshape([vertices.len()? / 3, 3])?;
+        if !self.faces.has_quads() {
+            let faces = PyArray1::from_slice(py, triangles.as_flattened());
+            return Ok((vertices, faces.reshape([triangles.len(), 3])?));
+        }
+        let mut rows: Vec<[u32; 4]> = Vec::with_capacity(self.faces.len());
+        for (prim, &[a, b, c]) in triangles.iter().enumerate() {
+            match (self.faces.part(prim as u32), rows.last_mut()) {
+                (Part::Second, Some(row)) => row[3] = c,
+                _ => rows.push([a, b, c, c]),
+            }
+        }
+        let faces = PyArray1::from_slice(py, rows.as_flattened());
+        Ok((vertices, faces.reshape([rows.len(), 4])?))
     }
 
-    /// The first primitive of each mesh, and the number of primitives.
+    /// The first face of each mesh, and the number of faces.
     #[getter]
     fn starts(&self) -> Vec<u32> {
-        self.starts.clone()
+        self.faces.starts().to_vec()
     }
 
     /// Masks of the meshes.
@@ -271,7 +301,7 @@ impl DoubleCore {
     fn plan(&self) -> (&'static str, &'static str) {
         match &self.held {
             Held::Meshes(_, report) => plan_of(self.preset, report),
-            Held::Instances(_) => (self.preset.name(), CostChoice::default().name()),
+            Held::Instances(..) => (self.preset.name(), CostChoice::default().name()),
         }
     }
 
@@ -280,7 +310,7 @@ impl DoubleCore {
     fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
         match &self.held {
             Held::Meshes(object, _) => object.geometry.bounds(),
-            Held::Instances(scene) => scene.bounds(),
+            Held::Instances(scene, _) => scene.bounds(),
         }
     }
 
@@ -291,10 +321,11 @@ impl DoubleCore {
             Held::Meshes(object, report) => {
                 let figures = crate::core::figures(py, report, self.preset, count)?;
                 figures.set_item("tree_bytes", object.tree.bytes())?;
-                figures.set_item("geometry_bytes", object.geometry.bytes())?;
+                let table = self.faces.bytes();
+                figures.set_item("geometry_bytes", object.geometry.bytes() + table)?;
                 Ok(figures)
             }
-            Held::Instances(scene) => {
+            Held::Instances(scene, _) => {
                 let figures =
                     crate::core::figures(py, &Build::from(scene.report()), self.preset, count)?;
                 let mut objects: Vec<&Arc<Object>> =
@@ -305,7 +336,7 @@ impl DoubleCore {
                 objects.dedup_by_key(|object| Arc::as_ptr(object));
                 let tree: usize = objects.iter().map(|object| object.tree.bytes()).sum();
                 let mesh: usize = objects.iter().map(|object| object.geometry.bytes()).sum();
-                figures.set_item("primitives", self.starts.last().copied().unwrap_or(0))?;
+                figures.set_item("primitives", self.faces.len())?;
                 figures.set_item("degenerate", degenerate)?;
                 figures.set_item("tree_bytes", tree + scene.bytes())?;
                 figures.set_item("geometry_bytes", mesh)?;
@@ -340,9 +371,9 @@ impl DoubleCore {
                         Some(f) => cast(object).with_filter(f).closest_hit_into(&rays, t, prim),
                         None => cast(object).closest_hit_into(&rays, t, prim),
                     }
-                    crate::core::number(&self.starts, prim, geom);
+                    self.faces.number(prim, geom);
                 }
-                (Held::Instances(scene), filter) => {
+                (Held::Instances(scene, of), filter) => {
                     let geom: &mut [u32] = bytemuck::cast_slice_mut(geom);
                     match filter {
                         Some(f) => {
@@ -350,6 +381,7 @@ impl DoubleCore {
                         }
                         None => place(scene).closest_hit_into(&rays, t, geom, prim),
                     }
+                    faces_within(of, geom, prim);
                 }
             }
             invalid
@@ -380,10 +412,10 @@ impl DoubleCore {
                     cast(object).with_filter(f).occluded_into(&rays, hit);
                 }
                 (Held::Meshes(object, _), None) => cast(object).occluded_into(&rays, hit),
-                (Held::Instances(scene), Some(f)) => {
+                (Held::Instances(scene, _), Some(f)) => {
                     place(scene).with_filter(f).occluded_into(&rays, hit);
                 }
-                (Held::Instances(scene), None) => place(scene).occluded_into(&rays, hit),
+                (Held::Instances(scene, _), None) => place(scene).occluded_into(&rays, hit),
             }
             invalid
         };
@@ -391,7 +423,7 @@ impl DoubleCore {
         Ok((hit.into_pyarray(py), invalid.count, invalid.first))
     }
 
-    /// The number of primitives that each ray hits.
+    /// The number of faces that each ray hits.
     fn count_hits<'py>(
         &self,
         py: Python<'py>,
@@ -405,11 +437,20 @@ impl DoubleCore {
         let tasks = blocks(view.count, block).zip(counts.chunks_mut(block)).collect();
         let trace = |(range, counts): (Range<usize>, &mut [i32])| {
             let (rays, invalid) = rays_of(&view, range.clone());
+            if self.has_quads() {
+                let all = self.first_of(&view, &range, &rays, usize::MAX);
+                for (count, row) in counts.iter_mut().zip(all.offsets.windows(2)) {
+                    *count = (row[1] - row[0]) as i32;
+                }
+                return invalid;
+            }
             let found = match (&self.held, self.filter(&view, &range)) {
                 (Held::Meshes(object, _), Some(f)) => cast(object).with_filter(f).count_hits(&rays),
                 (Held::Meshes(object, _), None) => cast(object).count_hits(&rays),
-                (Held::Instances(scene), Some(f)) => place(scene).with_filter(f).count_hits(&rays),
-                (Held::Instances(scene), None) => place(scene).count_hits(&rays),
+                (Held::Instances(scene, _), Some(f)) => {
+                    place(scene).with_filter(f).count_hits(&rays)
+                }
+                (Held::Instances(scene, _), None) => place(scene).count_hits(&rays),
             };
             counts.copy_from_slice(bytemuck::cast_slice(&found));
             invalid
@@ -426,24 +467,14 @@ impl DoubleCore {
         rays: &DoubleRays,
         threads: usize,
         k: Option<usize>,
-    ) -> PyResult<Rows<'py>> {
+    ) -> PyResult<Lists<'py>> {
         let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let (n, k) = (view.count, k.unwrap_or(usize::MAX));
         let ranges = blocks(n, crate::core::block(n, threads, BLOCK)).collect();
         let trace = |range: Range<usize>| {
             let (rays, invalid) = rays_of(&view, range.clone());
-            let all = match (&self.held, self.filter(&view, &range)) {
-                (Held::Meshes(object, _), Some(f)) => {
-                    of_meshes(cast(object).with_filter(f).first_hits(&rays, k))
-                }
-                (Held::Meshes(object, _), None) => of_meshes(cast(object).first_hits(&rays, k)),
-                (Held::Instances(scene), Some(f)) => {
-                    place(scene).with_filter(f).first_hits(&rays, k)
-                }
-                (Held::Instances(scene), None) => place(scene).first_hits(&rays, k),
-            };
-            (all, invalid)
+            (self.first_of(&view, &range, &rays, k), invalid)
         };
         let (parts, invalid): (Vec<InstanceAllHits>, Vec<Invalid>) =
             work::for_each(py, threads, ranges, trace)?.into_iter().unzip();
@@ -470,8 +501,11 @@ impl DoubleCore {
             let prim: &mut [u32] = bytemuck::cast_slice_mut(prim);
             prim.copy_from_slice(&part.prim_id);
             match &self.held {
-                Held::Meshes(..) => crate::core::number(&self.starts, prim, geom),
-                Held::Instances(_) => geom.copy_from_slice(bytemuck::cast_slice(&part.instance)),
+                Held::Meshes(..) => self.faces.number(prim, geom),
+                Held::Instances(_, of) => {
+                    geom.copy_from_slice(bytemuck::cast_slice(&part.instance));
+                    faces_within(of, &part.instance, prim);
+                }
             }
         })?;
         let (t, prim, geom) = (t.into_pyarray(py), prim.into_pyarray(py), geom.into_pyarray(py));
@@ -510,12 +544,12 @@ impl DoubleCore {
             let mut lost = 0;
             for (i, value) in range.zip(values.chunks_exact_mut(width)) {
                 value.fill(f64::NAN);
-                let Some(prim) = crate::core::primitive(&self.starts, prim[i], geom[i]) else {
-                    continue;
-                };
+                let Some(face) = self.faces.face(prim[i], geom[i]) else { continue };
                 let ray = ray.map_or(i, |ray| ray[i] as usize);
                 let ray = (ray < view.count).then(|| ray_of(&view, ray).with_range(t[i], t[i]));
-                let found = ray.is_some_and(|ray| self.look(surface, prim, geom[i], &ray, value));
+                let found = ray.is_some_and(|ray| {
+                    self.look(surface, (face, geom[i], view.sides), &ray, value)
+                });
                 lost += usize::from(!found);
             }
             lost
@@ -530,7 +564,7 @@ impl DoubleCore {
     pub fn object(&self) -> Option<&Arc<Object>> {
         match &self.held {
             Held::Meshes(object, _) => Some(object),
-            Held::Instances(_) => None,
+            Held::Instances(..) => None,
         }
     }
 
@@ -538,23 +572,78 @@ impl DoubleCore {
     pub fn built(&self) -> Option<(&Object, &Build)> {
         match &self.held {
             Held::Meshes(object, report) => Some((object, report)),
-            Held::Instances(_) => None,
+            Held::Instances(..) => None,
         }
     }
 
-    /// Meshes that have been built, their first primitives and masks.
+    /// Meshes that have been built, their faces and masks.
     pub fn of(
         object: Object,
         report: Build,
-        (starts, masks): (Vec<u32>, Vec<u32>),
+        (faces, masks): (Faces, Vec<u32>),
         preset: Preset,
     ) -> Self {
-        DoubleCore { held: Held::Meshes(Arc::new(object), report), starts, masks, preset }
+        let held = Held::Meshes(Arc::new(object), report);
+        DoubleCore { held, faces: Arc::new(faces), masks, preset }
     }
 
-    /// The first primitive of each mesh, and the number of primitives.
-    pub fn first_primitives(&self) -> &[u32] {
-        &self.starts
+    /// How what is hit is numbered.
+    pub fn faces(&self) -> &Faces {
+        &self.faces
+    }
+
+    /// True if any face, of meshes or of instances, is a quad.
+    fn has_quads(&self) -> bool {
+        self.faces.has_quads() || matches!(&self.held, Held::Instances(_, of) if !of.is_empty())
+    }
+
+    /// The first `k` hits of each ray, each face once.
+    fn first_of(
+        &self,
+        view: &View<'_, f64>,
+        range: &Range<usize>,
+        rays: &[DoubleRay],
+        k: usize,
+    ) -> InstanceAllHits {
+        // Of twice as many hits no more than half are seconds of quads.
+        let most = if self.has_quads() { k.saturating_mul(2) } else { k };
+        let mut all = match (&self.held, self.filter(view, range)) {
+            (Held::Meshes(object, _), Some(f)) => {
+                of_meshes(cast(object).with_filter(f).first_hits(rays, most))
+            }
+            (Held::Meshes(object, _), None) => of_meshes(cast(object).first_hits(rays, most)),
+            (Held::Instances(scene, _), Some(f)) => {
+                place(scene).with_filter(f).first_hits(rays, most)
+            }
+            (Held::Instances(scene, _), None) => place(scene).first_hits(rays, most),
+        };
+        if !self.has_quads() {
+            return all;
+        }
+        let face = |i: usize| match &self.held {
+            Held::Meshes(..) => u64::from(self.faces.of(all.prim_id[i])),
+            Held::Instances(_, of) => {
+                let instance = all.instance[i];
+                u64::from(instance) << 32 | u64::from(of[instance as usize].of(all.prim_id[i]))
+            }
+        };
+        let found: Vec<u64> = (0..all.prim_id.len()).map(face).collect();
+        let InstanceAllHits { offsets, t, prim_id, instance } = &mut all;
+        let left = once(
+            offsets,
+            k,
+            |i| found[i],
+            |to, from| {
+                (t[to], prim_id[to]) = (t[from], prim_id[from]);
+                if !instance.is_empty() {
+                    instance[to] = instance[from];
+                }
+            },
+        );
+        t.truncate(left);
+        prim_id.truncate(left);
+        instance.truncate(left);
+        all
     }
 
     /// Masks of the meshes.
@@ -568,27 +657,35 @@ impl DoubleCore {
     }
 
     /// Writes what is asked about the hit of a ray whose range holds its parameter alone; false if the ray does
-    /// not hit the primitive there.
+    /// not hit the face there on a side that counts.
     fn look(
         &self,
         surface: Surface,
-        prim: u32,
-        geom: i32,
+        (face, geom, sides): (u32, i32, Sides),
         ray: &DoubleRay,
         value: &mut [f64],
     ) -> bool {
-        let (object, transform, prim, ray) = match &self.held {
-            Held::Meshes(object, _) => (object, None, prim, *ray),
-            Held::Instances(scene) => {
+        let (object, transform, face, ray, faces) = match &self.held {
+            Held::Meshes(object, _) => (object, None, face, *ray, Some(&*self.faces)),
+            Held::Instances(scene, of) => {
                 let geom = geom as usize;
                 let placed = &scene.instances()[geom];
                 let ray = placed.transform.ray_to_object(ray);
-                (&placed.object, Some(&placed.transform), prim - self.starts[geom], ray)
+                let face = face - self.faces.starts()[geom];
+                (&placed.object, Some(&placed.transform), face, ray, of.get(geom).map(|of| &**of))
             }
         };
-        let Some(hit) = object.geometry.intersect(prim, &ray) else { return false };
+        let prims = faces.map_or(face..face + 1, |faces| faces.primitives(face));
+        // Both triangles of a quad may be hit there, one of them on the other side.
+        let hit = prims
+            .into_iter()
+            .find_map(|prim| Some((prim, object.geometry.intersect_on(prim, &ray, sides)?)));
+        let Some((prim, hit)) = hit else { return false };
         match surface {
-            Surface::Coordinates => value.copy_from_slice(&[hit.u, hit.v]),
+            Surface::Coordinates => {
+                let part = faces.map_or(Part::Whole, |faces| faces.part(prim));
+                value.copy_from_slice(&part.coordinates([hit.u, hit.v]));
+            }
             Surface::Normal => {
                 let n = object.geometry.normal(prim);
                 value.copy_from_slice(&transform.map_or(n, |transform| transform.normal(n)));
@@ -624,9 +721,9 @@ impl RayFilter<'_> {
         self.masks.is_none_or(|masks| one(masks, ray) & self.core.masks[mesh] != 0)
     }
 
-    /// Whether the primitive, numbered through all meshes, is not the one that the ray ignores.
-    fn counts(&self, ray: usize, prim: u32) -> bool {
-        self.view.skip.is_none_or(|skip| one(skip, ray) != prim)
+    /// Whether the face, numbered through all meshes, is not the one that the ray ignores.
+    fn counts(&self, ray: usize, face: u32) -> bool {
+        self.view.skip.is_none_or(|skip| one(skip, ray) != face)
     }
 
     /// Whether the ray, moved into the space of the triangles, hits one on a side that counts.
@@ -649,8 +746,8 @@ impl DoubleFilter for RayFilter<'_> {
     fn accepts(&self, ray: usize, hit: &DoubleHit) -> bool {
         let ray = self.first + ray;
         let Held::Meshes(object, _) = &self.core.held else { return true };
-        self.counts(ray, hit.prim_id)
-            && self.accepts_mesh(ray, crate::core::mesh(&self.core.starts, hit.prim_id))
+        self.counts(ray, self.core.faces.of(hit.prim_id))
+            && self.accepts_mesh(ray, self.core.faces.mesh(hit.prim_id))
             && self.meets(ray, (hit.prim_id, hit.t), &object.geometry, |ray| *ray)
     }
 }
@@ -658,9 +755,11 @@ impl DoubleFilter for RayFilter<'_> {
 impl InstanceFilter for RayFilter<'_> {
     fn accepts(&self, ray: usize, hit: &InstanceHit) -> bool {
         let ray = self.first + ray;
-        let Held::Instances(scene) = &self.core.held else { return true };
-        let placed = &scene.instances()[hit.instance as usize];
-        self.counts(ray, self.core.starts[hit.instance as usize] + hit.prim_id)
+        let Held::Instances(scene, of) = &self.core.held else { return true };
+        let instance = hit.instance as usize;
+        let placed = &scene.instances()[instance];
+        let face = of.get(instance).map_or(hit.prim_id, |of| of.of(hit.prim_id));
+        self.counts(ray, self.core.faces.starts()[instance] + face)
             && self.meets(ray, (hit.prim_id, hit.t), &placed.object.geometry, |ray| {
                 placed.transform.ray_to_object(ray)
             })
@@ -673,6 +772,18 @@ impl InstanceFilter for RayFilter<'_> {
 
 fn of_meshes(DoubleAllHits { offsets, t, prim_id }: DoubleAllHits) -> InstanceAllHits {
     InstanceAllHits { offsets, t, prim_id, instance: Vec::new() }
+}
+
+/// Replaces triangles by faces within their instances; misses stay what they are.
+fn faces_within(of: &[Arc<Faces>], instance: &[u32], prim: &mut [u32]) {
+    if of.is_empty() {
+        return;
+    }
+    for (prim, &instance) in prim.iter_mut().zip(instance) {
+        if let Some(of) = of.get(instance as usize) {
+            *prim = of.of(*prim);
+        }
+    }
 }
 
 fn cast(object: &Object) -> DoubleCaster<'_> {

@@ -96,6 +96,15 @@ impl Failure {
                         );
                         argument(&name, Some(face), message)
                     }
+                    // The number of the primitive is one of all meshes.
+                    GeometryError::Shape { error, .. } => {
+                        let name = format!("meshes[{mesh}]");
+                        argument(&name, None, format!("{name}: {error}"))
+                    }
+                    GeometryError::NotFinite { what, .. } => {
+                        let name = format!("meshes[{mesh}]");
+                        argument(&name, None, format!("{name}: a {what} does not fit into float32"))
+                    }
                     _ => argument(&name("faces"), None, error.to_string()),
                 }
             }

@@ -3,6 +3,7 @@
 use crate::core::Core;
 use crate::double::DoubleCore;
 use crate::error::{self, Failure};
+use crate::faces::{Faces, MeshFaces, Rows};
 use crate::figures::Build;
 use crate::work;
 use numpy::PyReadonlyArray2;
@@ -20,6 +21,9 @@ use std::path::{Path, PathBuf};
 /// mask of each; all `u32`.
 const MESHES: Tag = Tag(*b"mesh");
 
+/// The section that says which triangles are the second ones of quads: a bit each. Absent without quads.
+const QUADS: Tag = Tag(*b"quad");
+
 /// A scene of either precision.
 #[derive(FromPyObject)]
 pub enum AnyCore<'py> {
@@ -33,7 +37,7 @@ pub fn save(py: Python<'_>, core: AnyCore<'_>, path: PathBuf) -> PyResult<u64> {
     match &core {
         AnyCore::Single(core) => {
             let contents = Contents::new(&core.tree, &core.geometry);
-            write(py, path, contents, &core.report, core.preset, (&core.starts, &core.masks))
+            write(py, path, contents, &core.report, core.preset, (&core.faces, &core.masks))
         }
         AnyCore::Double(core) => {
             let (object, report) = core.built().ok_or_else(|| {
@@ -42,29 +46,31 @@ pub fn save(py: Python<'_>, core: AnyCore<'_>, path: PathBuf) -> PyResult<u64> {
                 error::not_saved(format!("cannot save {}: {message}", path.display()))
             })?;
             let contents = Contents::of_double(&object.tree, &object.geometry);
-            let meshes = (core.first_primitives(), core.mesh_masks());
+            let meshes = (core.faces(), core.mesh_masks());
             write(py, path, contents, report, core.built_with(), meshes)
         }
     }
 }
 
-/// Writes a scene with its meshes, their first primitives and masks.
+/// Writes a scene with its meshes, their faces and masks.
 fn write(
     py: Python<'_>,
     path: PathBuf,
     contents: Contents<'_>,
     report: &Build,
     preset: Preset,
-    (starts, masks): (&[u32], &[u32]),
+    (faces, masks): (&Faces, &[u32]),
 ) -> PyResult<u64> {
     let figures = Figures {
         preset: Some(preset),
         duplication: report.duplication,
         tree: report.tree.clone(),
     };
-    let numbers = [masks.len() as u32].into_iter().chain(starts.iter().copied());
+    let numbers = [masks.len() as u32].into_iter().chain(faces.primitive_starts());
     let numbers = numbers.chain(masks.iter().copied());
-    let extra = [Extra { tag: MESHES, bytes: numbers.flat_map(u32::to_le_bytes).collect() }];
+    let mut extra =
+        vec![Extra { tag: MESHES, bytes: numbers.flat_map(u32::to_le_bytes).collect() }];
+    extra.extend(faces.seconds().map(|bytes| Extra { tag: QUADS, bytes }));
     let contents = Contents { figures: Some(&figures), extra: &extra, ..contents };
     let save = |stop: &work::Stop<'_>| ropewalk_file::save_monitored(&path, &contents, stop);
     let saved = work::alone(py, save)?;
@@ -99,45 +105,52 @@ pub fn open(
             _ => error::file("SceneFileError", message),
         }
     })?;
-    let faces = match &faces {
-        Some(faces) => Some(faces.as_slice()?.as_chunks::<3>().0),
+    let rows = match &faces {
+        Some(faces) => Rows::new(faces.as_slice()?, faces.as_array().ncols()),
         None => None,
     };
     match scene {
         AnyOpened::Single(scene) => {
-            let expected = match (&rounded, faces) {
-                (Some(vertices), Some(faces)) => {
+            let expected = match (&rounded, rows) {
+                (Some(vertices), Some(rows)) => {
                     let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
-                    let hash = work::alone(py, |stop| rounded_hash(vertices, faces, stop))?;
-                    Some((faces.len(), hash.map_err(|failure| failure.into_exception(true))?))
+                    let hash = work::alone(py, |stop| rounded_hash(vertices, rows, stop))?;
+                    Some((rows, hash.map_err(|failure| failure.into_exception(true))?))
                 }
                 _ => None,
             };
             let geometry = &scene.geometry;
             let (count, degenerate) = (geometry.len(), geometry.degenerate_count());
-            let (starts, masks) =
+            let (faces, masks) =
                 checked(&path, (count, &scene.geometry_hash, &scene.extra), expected)?;
             let Opened { tree, geometry, figures, .. } = *scene;
-            let (preset, report) = built(figures, count, degenerate);
-            Ok(Py::new(py, Core { geometry, tree, report, starts, masks, preset })?.into_any())
+            let (preset, report) = built(figures, faces.len(), degenerate);
+            Ok(Py::new(py, Core { geometry, tree, report, faces, masks, preset })?.into_any())
         }
         AnyOpened::Double(scene) => {
-            let expected = match (&vertices, faces) {
-                (Some(vertices), Some(faces)) => {
+            let expected = match (&vertices, rows) {
+                (Some(vertices), Some(rows)) => {
                     let (vertices, _) = vertices.as_slice()?.as_chunks::<3>();
-                    let hash = work::alone(py, |stop| mesh_hash(vertices, faces, stop))?;
-                    Some((faces.len(), hash.map_err(|error| error::other(error.to_string()))?))
+                    let hash = work::alone(py, |stop| match rows.triangles_alone() {
+                        Some(faces) => mesh_hash(vertices, faces, stop),
+                        None => {
+                            let cut: Vec<_> =
+                                rows.triangles().map(|(_, corners)| corners).collect();
+                            mesh_hash(vertices, &cut, stop)
+                        }
+                    })?;
+                    Some((rows, hash.map_err(|error| error::other(error.to_string()))?))
                 }
                 _ => None,
             };
             let geometry = &scene.geometry;
             let (count, degenerate) = (geometry.len(), geometry.degenerate_count());
-            let (starts, masks) =
+            let (faces, masks) =
                 checked(&path, (count, &scene.geometry_hash, &scene.extra), expected)?;
             let Opened { tree, geometry, figures, .. } = *scene;
-            let (preset, report) = built(figures, count, degenerate);
+            let (preset, report) = built(figures, faces.len(), degenerate);
             let object = Object { geometry, tree };
-            Ok(Py::new(py, DoubleCore::of(object, report, (starts, masks), preset))?.into_any())
+            Ok(Py::new(py, DoubleCore::of(object, report, (faces, masks), preset))?.into_any())
         }
     }
 }
@@ -151,34 +164,41 @@ fn built(figures: Option<Figures>, primitives: usize, degenerate: usize) -> (Pre
     (preset.unwrap_or(Preset::Balanced), report)
 }
 
-/// First primitives and masks of the meshes of a file of so many primitives and that hash, if they are what is
-/// expected.
+/// Faces and masks of the meshes of a file of so many primitives and that hash, if they are what is expected.
 fn checked(
     path: &Path,
     (found, found_hash, extra): (usize, &Hash, &[Extra]),
-    expected: Option<(usize, Hash)>,
-) -> PyResult<(Vec<u32>, Vec<u32>)> {
+    expected: Option<(Rows<'_>, Hash)>,
+) -> PyResult<(Faces, Vec<u32>)> {
     let refuse =
         |reason: String| error::file("OtherGeometryError", format!("{}: {reason}", path.display()));
-    let (starts, masks) = meshes(found, extra).ok_or_else(|| {
-        let message = "section mesh does not fit the number of primitives";
+    let damaged = |section: &str| {
+        let message = format!("section {section} does not fit the number of primitives");
         error::file("SceneFileError", format!("{}: {message}", path.display()))
-    })?;
-    if let Some((faces, hash)) = expected {
+    };
+    let (starts, masks) = meshes(found, extra).ok_or_else(|| damaged("mesh"))?;
+    let faces = match extra.iter().find(|extra| extra.tag == QUADS) {
+        Some(extra) => Faces::with_seconds(&starts, &extra.bytes).ok_or_else(|| damaged("quad"))?,
+        None => Faces::new(starts),
+    };
+    if let Some((rows, hash)) = expected {
         if masks.len() != 1 {
             return Err(refuse(format!("it holds {} meshes; expected one", masks.len())));
         }
-        if found != faces {
-            return Err(refuse(format!("it was built for {found} primitives; expected {faces}")));
+        if faces.len() != rows.len() {
+            let (found, expected) = (faces.len(), rows.len());
+            return Err(refuse(format!(
+                "it was built for {found} primitives; expected {expected}"
+            )));
         }
-        if hash != *found_hash {
+        if hash != *found_hash || Faces::of_meshes(&[MeshFaces::Rows(rows)]) != faces {
             let (expected, found) = (short(&hash), short(found_hash));
             return Err(refuse(format!(
                 "it was built for other geometry; expected hash {expected}, found {found}"
             )));
         }
     }
-    Ok((starts, masks))
+    Ok((faces, masks))
 }
 
 /// First primitives and masks of the meshes of a file: one mesh if it does not say. `None` if what it says
@@ -201,16 +221,19 @@ fn meshes(primitives: usize, extra: &[Extra]) -> Option<(Vec<u32>, Vec<u32>)> {
 /// The hash of the geometry that a scene of one mesh has.
 fn rounded_hash(
     vertices: &[[f32; 3]],
-    faces: &[[u32; 3]],
+    faces: Rows<'_>,
     monitor: &dyn Monitor,
 ) -> Result<Hash, Failure> {
     let wrong = |i: &u32| *i as usize >= vertices.len();
-    if let Some(face) = faces.iter().position(|corners| corners.iter().any(wrong)) {
-        let found = faces[face].into_iter().find(wrong).unwrap_or_default();
+    let found = faces
+        .triangles()
+        .find_map(|(face, corners)| corners.into_iter().find(wrong).map(|found| (face, found)));
+    if let Some((face, found)) = found {
         let error = GeometryError::Face { face, found, vertices: vertices.len() };
         return Err(Failure::Mesh(0, error));
     }
     // Half a hash is never looked at: the call raises.
-    let faces = faces.chunks(1 << 14).take_while(|_| !monitor.is_cancelled()).flatten();
-    Ok(triangles_hash(faces.map(|corners| corners.map(|i| vertices[i as usize]))))
+    let corners = faces.triangles().enumerate();
+    let corners = corners.take_while(|(i, _)| i % (1 << 14) != 0 || !monitor.is_cancelled());
+    Ok(triangles_hash(corners.map(|(_, (_, corners))| corners.map(|i| vertices[i as usize]))))
 }

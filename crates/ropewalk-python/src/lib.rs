@@ -10,6 +10,7 @@
 mod core;
 mod double;
 mod error;
+mod faces;
 mod figures;
 mod file;
 mod mesh;

@@ -2,6 +2,7 @@
 
 use crate::core::{Core, zeros};
 use crate::double::DoubleCore;
+use crate::faces::Faces;
 use crate::{error, work};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -34,11 +35,11 @@ enum Asked {
 }
 
 impl Asked {
-    /// The first primitive of each mesh, and the number of primitives.
-    fn first_primitives(&self) -> &[u32] {
+    /// How triangles are numbered.
+    fn faces(&self) -> &Faces {
         match self {
-            Asked::Single(core) => core.get().first_primitives(),
-            Asked::Double(core) => core.get().first_primitives(),
+            Asked::Single(core) => core.get().faces(),
+            Asked::Double(core) => core.get().faces(),
         }
     }
 
@@ -130,7 +131,7 @@ impl Points {
         threads: usize,
     ) -> PyResult<Nearest<'py>> {
         let (points, queries) = (chunked(&points)?, self.core.queries()?);
-        let (n, starts) = (points.len(), self.core.first_primitives());
+        let (n, faces) = (points.len(), self.core.faces());
         let (mut distance, mut prim, mut geom) =
             (zeros::<f64>(n)?, zeros::<i32>(n)?, zeros::<i32>(n)?);
         let (mut position, mut uv) = (zeros::<[f64; 3]>(n)?, zeros::<[f64; 2]>(n)?);
@@ -151,7 +152,12 @@ impl Points {
                 prim.copy_from_slice(&found.prim_id);
                 position.copy_from_slice(&found.point);
                 uv.copy_from_slice(&found.uv);
-                crate::core::number(starts, prim, geom);
+                if faces.has_quads() {
+                    for (uv, &prim) in uv.iter_mut().zip(prim.iter()) {
+                        *uv = faces.part(prim).coordinates(*uv);
+                    }
+                }
+                faces.number(prim, geom);
             },
         )?;
         Ok((
@@ -221,7 +227,7 @@ impl Points {
                 }
             });
         }
-        let triangles = self.core.first_primitives().last().map_or(1, |&n| n.max(1) as usize);
+        let triangles = self.core.faces().len().max(1);
         let most = (FULL_TASK / triangles).clamp(1, BLOCK);
         self.each(py, &points, threads, most, |queries, points, out| {
             out.copy_from_slice(&ask!(queries, queries => queries.winding_number(points)));
@@ -243,7 +249,7 @@ impl Points {
         })
     }
 
-    /// Boxes and numbers of references of leaves; NaN and -1 for what is no leaf. Of all leaves
+    /// Boxes of leaves and how many faces each refers to; NaN and -1 for what is no leaf. Of all leaves
     /// without `cells`.
     #[pyo3(signature = (cells=None))]
     fn cells<'py>(
@@ -251,7 +257,15 @@ impl Points {
         py: Python<'py>,
         cells: Option<PyReadonlyArray1<'py, i64>>,
     ) -> PyResult<Leaves<'py>> {
-        let queries = self.core.queries()?;
+        let (queries, faces) = (self.core.queries()?, self.core.faces());
+        let faces_in = |mut prims: Vec<u32>| {
+            if faces.has_quads() {
+                prims.iter_mut().for_each(|prim| *prim = faces.of(*prim));
+                prims.sort_unstable();
+                prims.dedup();
+            }
+            prims.len() as i32
+        };
         let cells = match &cells {
             Some(cells) => cells.as_slice()?.to_vec(),
             None => {
@@ -269,7 +283,7 @@ impl Points {
                 (*bounds, *count) = ([[f64::NAN; 3]; 2], -1);
                 let Some(cell) = cell else { continue };
                 ask!(queries, queries => if let Some(corners) = queries.cell_corners(cell) {
-                    (*bounds, *count) = (corners, queries.cell_primitives(cell).len() as i32);
+                    (*bounds, *count) = (corners, faces_in(queries.cell_primitives(cell)));
                 });
             }
         })?;

@@ -1,12 +1,14 @@
 //! What is known of a hit beyond its parameter, worked out when it is asked for.
 
+use crate::faces::Part;
+use ropewalk::primitive::Primitive;
 use ropewalk::ray::PreparedRay;
-use ropewalk::{Geometry, Ray};
+use ropewalk::{Geometry, Ray, Sides};
 
 /// What is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Surface {
-    /// Barycentric weights of vertices 1 and 2; 0 on what is no triangle.
+    /// Barycentric weights of vertices 1 and 2, on quads see [`Part::coordinates`]; 0 on what is neither.
     Coordinates,
     /// Unit normal, to the side from which vertices run counter-clockwise.
     Normal,
@@ -32,19 +34,26 @@ impl Surface {
 }
 
 /// Writes to `value` what is asked about the hit of a ray whose range holds its parameter alone; false
-/// if the ray does not hit the primitive there.
+/// if the ray does not hit the primitive there on a side that counts.
 pub fn look(
     geometry: &Geometry,
     surface: Surface,
     ray: &Ray,
-    prim: u32,
+    (prim, part, sides): (u32, Part, Sides),
     value: &mut [f32],
 ) -> bool {
-    let hit = PreparedRay::new(ray).and_then(|ray| geometry.intersect(prim, &ray));
-    let Some(hit) = hit else { return false };
+    let Some(prepared) = PreparedRay::new(ray) else { return false };
+    let Some(hit) = geometry.intersect(prim, &prepared) else { return false };
+    // Both triangles of a quad may be hit there, one of them on the other side.
+    if part != Part::Whole
+        && sides != Sides::Both
+        && geometry.shape(prim).intersect(&prepared, sides).is_none()
+    {
+        return false;
+    }
     let write = |value: &mut [f32], p: [f64; 3]| value.copy_from_slice(&p.map(|x| x as f32));
     match surface {
-        Surface::Coordinates => value.copy_from_slice(&[hit.u, hit.v]),
+        Surface::Coordinates => value.copy_from_slice(&part.coordinates([hit.u, hit.v])),
         Surface::Normal => write(value, geometry.normals(ray, &hit).geometric),
         Surface::Position => match geometry.triangle(prim) {
             Some(triangle) => {

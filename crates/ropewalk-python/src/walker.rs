@@ -1,6 +1,6 @@
 //! Particles moved along segments, and cells to start from.
 
-use crate::core::{Core, block, blocks, masks_that_refuse, mesh, zeros};
+use crate::core::{Core, block, blocks, masks_that_refuse, zeros};
 use crate::{error, rays, work};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -70,13 +70,18 @@ impl CrossingFilter for Met<'_> {
         };
         side && self.masks.is_none_or(|masks| {
             // An altered file may name primitives that are not there.
-            let mesh = self.core.masks.get(mesh(self.core.first_primitives(), crossed.prim_id));
+            let mesh = self.core.masks.get(self.core.faces().mesh(crossed.prim_id));
             rays::one(masks, self.first + particle) & mesh.copied().unwrap_or(!0) != 0
         })
     }
+
+    #[inline]
+    fn passes(&self, passed: u32, prim: u32) -> bool {
+        self.core.faces().of(passed) == self.core.faces().of(prim)
+    }
 }
 
-/// Where particles are and at which triangles they were stopped, afterwards.
+/// Where particles are and at which faces they were stopped, afterwards.
 type State<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>);
 
 /// Row starts, segments, parameters, primitives, meshes, and whether they are entered.
@@ -144,11 +149,18 @@ pub fn walk<'py>(
     let encounter = if stop { Encounter::Stop } else { Encounter::Pass };
     let tasks: Vec<Range<usize>> = blocks(n, block(n, threads, PARTICLES)).collect();
     let masks = masks_that_refuse(&core.masks, masks, &(0..n));
-    let is_plain = masks.is_none() && sides == Sides::Both;
+    let faces = core.faces();
+    let is_plain = masks.is_none() && sides == Sides::Both && !faces.has_quads();
+    let primitive = |&face: &u32| match face {
+        u32::MAX => face,
+        _ => faces.primitives(face).start,
+    };
     let run = |part: Range<usize>| -> Option<(Walked, Events)> {
         let here = positions[part.clone()].to_vec();
         let walker = Walker::new(core.tree(), core.geometry(), here).ok()?;
-        let walker = walker.with_threads(1).with_stopped(stopped[part.clone()].to_vec());
+        let walker = walker
+            .with_threads(1)
+            .with_stopped(stopped[part.clone()].iter().map(primitive).collect());
         let segments = (&offsets[part.start..=part.end], directions, lengths, encounter);
         Some(if is_plain {
             moved(walker, segments)
@@ -170,7 +182,7 @@ pub fn walk<'py>(
     let (mut entering, mut invalid, mut particle) = (vec![], 0, 0);
     for ((positions, stopped), events) in &parts {
         at.extend_from_slice(positions.as_flattened());
-        on.extend_from_slice(stopped);
+        on.extend(stopped.iter().map(|&prim| faces.of(prim)));
         for &end in &events.offsets[1..] {
             particle += 1;
             rows[particle] = (t.len() + end) as i64;
@@ -182,7 +194,7 @@ pub fn walk<'py>(
         walked.extend(events.walked.iter().map(|&w| w as i32));
         invalid += events.invalid;
     }
-    crate::core::number(core.first_primitives(), bytemuck::cast_slice_mut(&mut prim), &mut geom);
+    faces.number(bytemuck::cast_slice_mut(&mut prim), &mut geom);
     let state = (at.into_pyarray(py), on.into_pyarray(py));
     let events = (
         rows.into_pyarray(py),

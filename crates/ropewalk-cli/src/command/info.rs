@@ -2,7 +2,9 @@
 
 use crate::output::{print_json, thousands};
 use crate::saved;
-use ropewalk::file::{AnyOpened, FORMAT_VERSION, LAYOUT_VERSION, Opened, Tag, short};
+use ropewalk::file::{
+    AnyOpened, FORMAT_VERSION, LAYOUT_VERSION, Opened, SHAPES_LAYOUT_VERSION, Tag, short,
+};
 use ropewalk::wide::WideTree;
 use serde::Serialize;
 use std::time::Instant;
@@ -88,6 +90,7 @@ fn meaning(tag: Tag) -> &'static str {
         Tag::FIGURES => "figures of the build",
         Tag(name) if name == *b"view" => "the scene's view",
         Tag(name) if name == *b"mesh" => "meshes of the Python package",
+        Tag(name) if name == *b"quad" => "quads of the Python package",
         _ => "not known",
     }
 }
@@ -162,7 +165,10 @@ impl Output {
             file: args.file.clone(),
             bytes: scene.bytes,
             format_version: FORMAT_VERSION,
-            layout_version: LAYOUT_VERSION,
+            layout_version: match tree.has_shapes() {
+                true => SHAPES_LAYOUT_VERSION,
+                false => LAYOUT_VERSION,
+            },
             verified: args.verify,
             geometry_hash: short(&scene.geometry_hash),
             precision,

@@ -96,7 +96,8 @@ impl<'a, F: CrossingFilter> Lists<'a, F> {
         self.walked[particle] += 1;
         self.positions[particle] = to;
         let (filter, index) = (self.filter, self.first + particle);
-        let counts = |hit: &&Crossed| hit.prim_id != passed && filter.accepts(index, hit);
+        let counts =
+            |hit: &&Crossed| !filter.passes(passed, hit.prim_id) && filter.accepts(index, hit);
         for hit in crossed.iter().filter(counts) {
             let length = self.lengths[self.offsets[particle] + segment as usize];
             let t = (hit.share * f64::from(length)) as f32;

@@ -64,6 +64,13 @@ pub struct Events {
 pub trait CrossingFilter: Sync {
     /// True if the crossing counts for the particle with this index.
     fn accepts(&self, particle: usize, crossed: &Crossed) -> bool;
+
+    /// True if a particle that was stopped at a triangle passes another one without an event too, since both are
+    /// parts of one face.
+    #[inline(always)]
+    fn passes(&self, stopped_at: u32, prim_id: u32) -> bool {
+        stopped_at == prim_id
+    }
 }
 
 /// Every crossing counts.
