@@ -262,16 +262,6 @@ class Scene(Saved, RayMethods, PointMethods):
         # Scenes and matrices that instances were made of.
         self._placed: tuple[list[Scene], np.ndarray] | None = None
 
-    def _single(self, what: str) -> Core:
-        """The core of a scene of single precision."""
-        if isinstance(self._core, DoubleCore):
-            raise ArgumentError(
-                f"{what}: expected a scene of single precision, found one of double precision; it can be "
-                f"made with precision='single'",
-                "scene",
-            )
-        return self._core
-
     @property
     def report(self) -> Report:
         """Figures of the build and of the tree.

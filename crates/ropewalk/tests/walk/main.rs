@@ -10,4 +10,5 @@ mod parts;
 mod ropes;
 mod scenes;
 mod walker;
+mod walker_double;
 mod wave;
