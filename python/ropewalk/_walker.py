@@ -111,7 +111,7 @@ class Walker:
             )
         self._scene, self._threads = scene, as_threads(threads)
         self._positions = self._floats(as_rows(positions, "positions")).copy()
-        self._stopped = np.full(len(self._positions), _NONE, np.uint32)
+        self._stopped: NDArray[np.uint32] = np.full(len(self._positions), _NONE, np.uint32)
 
     def _floats(self, array: np.ndarray) -> np.ndarray:
         """In the scene's precision."""
@@ -263,7 +263,7 @@ class Walker:
         few, shape = len(directions) <= _FEW_SEGMENTS, self._stopped.shape
         sides = as_choice(faces, "faces", ("both", "front", "back"))
         bits = None if masks is None else per_ray(as_masks(masks, "masks"), shape, "masks")
-        passed = self._stopped
+        passed: NDArray[np.uint32] = self._stopped
         if skip is not None:
             numbered = self._scene._skip(skip, shape)
             passed = np.where(numbered < 0, passed, numbered.view(np.uint32))
@@ -277,6 +277,8 @@ class Walker:
         )
         how = (bool(stop), 1 if few else self._threads, bits, sides)
         events = Events()
+        at: tuple[np.ndarray, NDArray[np.uint32]]
+        rows: tuple[np.ndarray, ...]
         if isinstance(core, DoubleCore):
             at, rows, events.walked, invalid = walk_double(core, *arrays, *how)
         else:
