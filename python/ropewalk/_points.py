@@ -268,8 +268,8 @@ class PointMethods:
         numbers = np.ascontiguousarray(given, np.int64).reshape(-1)
         found, bounds, count = self._ask().cells(numbers)
         shape = given.shape
-        bounds = self._as_bounds(bounds).reshape(*shape, 2, 3)
-        return Cells(found.reshape(shape), bounds, count.reshape(shape))
+        boxes = self._as_bounds(bounds).reshape(*shape, 2, 3)
+        return Cells(found.reshape(shape), boxes, count.reshape(shape))
 
     def _as_bounds(
         self, bounds: NDArray[np.float64]

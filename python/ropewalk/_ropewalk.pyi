@@ -35,7 +35,7 @@ _State = tuple[
     NDArray[np.uint8] | None,
 ]
 
-def cells_of(core: Core, points: NDArray[np.float64], threads: int) -> _I64: ...
+def cells_of(core: Core | DoubleCore, points: NDArray[np.float64], threads: int) -> _I64: ...
 def walk(
     core: Core,
     positions: _F32,
@@ -50,6 +50,23 @@ def walk(
 ) -> tuple[
     tuple[_F32, _U32],
     tuple[_I64, _I32, _F32, _I32, _I32, NDArray[np.bool_]],
+    _I32,
+    int,
+]: ...
+def walk_double(
+    core: DoubleCore,
+    positions: _F64,
+    stopped: _U32,
+    offsets: _I64,
+    directions: _F64,
+    lengths: _F64,
+    stop: bool,
+    threads: int,
+    masks: _U32 | None = None,
+    faces: str = "both",
+) -> tuple[
+    tuple[_F64, _U32],
+    tuple[_I64, _I32, _F64, _I32, _I32, NDArray[np.bool_]],
     _I32,
     int,
 ]: ...

@@ -241,6 +241,7 @@ class Scene(Saved, RayMethods, PointMethods):
                 "instances",
             ) from None
         scenes, matrices = [], np.zeros((len(pairs), 3, 4))
+        cores: list[DoubleCore] = []
         for i, pair in enumerate(pairs):
             name = f"instances[{i}]"
             try:
@@ -261,9 +262,9 @@ class Scene(Saved, RayMethods, PointMethods):
                     i,
                 )
             scenes.append(scene)
+            cores.append(scene._core)
             matrices[i] = _matrix(matrix, name, i)
         bits = [_ALL_BITS] * len(pairs) if masks is None else _mesh_masks(masks, len(pairs), "instance")
-        cores = [scene._core for scene in scenes]
         placed = cls.__new__(cls)
         core = DoubleCore.place(cores, matrices.reshape(-1), bits, as_threads(threads))
         placed._adopt(core)
@@ -277,16 +278,6 @@ class Scene(Saved, RayMethods, PointMethods):
         self._report: Report | None = None
         # Scenes and matrices that instances were made of.
         self._placed: tuple[list[Scene], np.ndarray] | None = None
-
-    def _single(self, what: str) -> Core:
-        """The core of a scene of single precision."""
-        if isinstance(self._core, DoubleCore):
-            raise ArgumentError(
-                f"{what}: expected a scene of single precision, found one of double precision; it can be "
-                f"made with precision='single'",
-                "scene",
-            )
-        return self._core
 
     @property
     def report(self) -> Report:
@@ -309,8 +300,9 @@ class Scene(Saved, RayMethods, PointMethods):
         array([[0., 0., 0.],
                [1., 1., 0.]], dtype=float32)
         """
-        bounds, dtype = self._core.bounds, np.float64 if self.precision == "double" else np.float32
-        return np.full((2, 3), np.nan, dtype) if bounds is None else np.array(bounds, dtype)
+        bounds = self._core.bounds
+        corners = np.full((2, 3), np.nan) if bounds is None else np.array(bounds, np.float64)
+        return corners if isinstance(self._core, DoubleCore) else corners.astype(np.float32)
 
     @property
     def precision(self) -> str:
@@ -568,11 +560,12 @@ def _build_double(
         starts.append(starts[-1] + len(corners))
     if first > 2**32 - 1 or starts[-1] > 2**32 - 1:
         raise ArgumentError(f"meshes: {first} vertices are too many; expected less than 2^32", "meshes")
-    one = len(meshes) == 1
-    joined = (vertices[0], faces[0]) if one else (np.concatenate(vertices), np.concatenate(faces))
+    v, f = vertices[0], faces[0]
+    if len(meshes) > 1:
+        v, f = np.concatenate(vertices), np.concatenate(faces)
     sample = as_sample(rays, DoubleRays, stacklevel=6)
     with _progress(progress) as show:
-        return DoubleCore.build(*joined, starts, masks, plan, threads, show, limit, sample)
+        return DoubleCore.build(v, f, starts, masks, plan, threads, show, limit, sample)
 
 
 def _plan(preset: str, cost_model: str) -> tuple[str, str]:

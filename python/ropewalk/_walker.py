@@ -12,6 +12,7 @@ from ._arrays import (
     as_array,
     as_choice,
     as_float32,
+    as_float64,
     as_masks,
     as_rows,
     as_threads,
@@ -19,7 +20,7 @@ from ._arrays import (
 )
 from ._errors import ArgumentError, ArgumentTypeError, InvalidRayWarning
 from ._hits import Hits
-from ._ropewalk import cells_of, walk
+from ._ropewalk import DoubleCore, cells_of, walk, walk_double
 from ._scene import Scene
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class Events:
     Attributes:
         offsets: int64, (N + 1,); the events of particle ``i`` are ``offsets[i]:offsets[i + 1]``.
         segment: int32, the segment, counted from the first of the particle's list.
-        t: float32, where on the segment, in lengths of its direction.
+        t: float32, float64 in a scene of double precision; where on the segment, in lengths of its direction.
         prim_id: int32, face within its mesh.
         geom_id: int32, mesh.
         entering: bool, from the front to the back of the face: into a body whose faces run
@@ -49,7 +50,7 @@ class Events:
 
     offsets: NDArray[np.int64]
     segment: NDArray[np.int32]
-    t: NDArray[np.float32]
+    t: NDArray[np.float32] | NDArray[np.float64]
     prim_id: NDArray[np.int32]
     geom_id: NDArray[np.int32]
     entering: NDArray[np.bool_]
@@ -76,12 +77,12 @@ class Walker:
     """Many particles in a scene of triangles and quads, each moved along segments of its own.
 
     Args:
-        scene: the scene; it must hold nothing but triangles and quads.
-        positions: shape (N, 3), rounded to float32.
+        scene: the scene; it must hold nothing but triangles and quads, and be none of instances.
+        positions: shape (N, 3), rounded to float32 unless the scene is of double precision.
         threads: threads of each call; 0 is one a processor that this process may use.
 
     A segment leads from where its particle is to ``position + length * direction``, rounded to float32
-    once. Every face that it crosses is reported, exactly once, and it is decided without rounding which
+    once; in a scene of double precision it is computed in float64, as NumPy would. Every face that it crosses is reported, exactly once, and it is decided without rounding which
     these are: also where segments end in faces, on edges or in vertices, and where particles turn there,
     none is missed or counted twice. A point in a face counts as on the side to which a step along +x
     leads (+y, +z if the face is parallel to that). A quad is crossed as its two triangles are: one that is
@@ -89,7 +90,7 @@ class Walker:
     a scene but not a walker: each call moves its particles.
 
     Raises:
-        ArgumentError: wrong shapes; a scene with other primitives, when particles are moved.
+        ArgumentError: wrong shapes; a scene of instances or with other primitives, when particles are moved.
         ArgumentTypeError: no scene, or arrays that are no real numbers.
 
     >>> import ropewalk
@@ -109,21 +110,24 @@ class Walker:
             raise ArgumentTypeError(
                 f"scene: expected a ropewalk.Scene, found {type(scene).__name__}", "scene"
             )
-        scene._single("scene")
         self._scene, self._threads = scene, as_threads(threads)
-        self._positions = as_float32(as_rows(positions, "positions")).copy()
-        self._stopped = np.full(len(self._positions), _NONE, np.uint32)
+        self._positions = self._floats(as_rows(positions, "positions")).copy()
+        self._stopped: NDArray[np.uint32] = np.full(len(self._positions), _NONE, np.uint32)
+
+    def _floats(self, array: np.ndarray) -> np.ndarray:
+        """In the scene's precision."""
+        return as_float64(array) if isinstance(self._scene._core, DoubleCore) else as_float32(array)
 
     @property
-    def positions(self) -> NDArray[np.float32]:
-        """Where the particles are, shape (N, 3); assign to it to put them elsewhere."""
+    def positions(self) -> NDArray[np.float32] | NDArray[np.float64]:
+        """Where the particles are, shape (N, 3), in the scene's precision; assign to it to put them elsewhere."""
         view = self._positions.view()
         view.flags.writeable = False
         return view
 
     @positions.setter
     def positions(self, positions: ArrayLike) -> None:
-        rows = as_float32(as_rows(positions, "positions"))
+        rows = self._floats(as_rows(positions, "positions"))
         if rows.shape != self._positions.shape:
             raise ArgumentError(
                 f"positions: expected shape {self._positions.shape}, found {rows.shape}", "positions"
@@ -138,7 +142,8 @@ class Walker:
 
     @property
     def cell(self) -> NDArray[np.int64]:
-        """The cells in which the particles are, for ``start=`` of queries; -1 outside of the scene."""
+        """The cells in which the particles are, for ``start=`` of queries; -1 outside of the scene, and without
+        meshes of triangles."""
         points = self._positions.astype(np.float64).reshape(-1)
         return cells_of(self._scene._core, points, self._threads)
 
@@ -173,8 +178,8 @@ class Walker:
             faces: ``"front"`` if only particles that enter (from the front to the back) meet a face,
                 ``"back"`` if only those that leave.
 
-        Segments with a number that is NaN, infinite or beyond 1e30, or with a negative length, are left
-        out and counted in an ``InvalidRayWarning``.
+        Segments with a number that is NaN, infinite or beyond 1e30 (1e100 times the scene's size in double
+        precision), or with a negative length, are left out and counted in an ``InvalidRayWarning``.
 
         Raises:
             ArgumentError, ArgumentTypeError: as :class:`Walker`.
@@ -259,31 +264,34 @@ class Walker:
         few, shape = len(directions) <= _FEW_SEGMENTS, self._stopped.shape
         sides = as_choice(faces, "faces", ("both", "front", "back"))
         bits = None if masks is None else per_ray(as_masks(masks, "masks"), shape, "masks")
-        passed = self._stopped
+        passed: NDArray[np.uint32] = self._stopped
         if skip is not None:
             numbered = self._scene._skip(skip, shape)
             passed = np.where(numbered < 0, passed, numbered.view(np.uint32))
-        state, rows, walked, invalid = walk(
-            self._scene._core,
+        core = self._scene._core
+        arrays = (
             self._positions.reshape(-1),
             passed,
             offsets,
-            as_float32(directions).reshape(-1),
-            as_float32(lengths),
-            bool(stop),
-            1 if few else self._threads,
-            bits,
-            sides,
+            self._floats(directions).reshape(-1),
+            self._floats(lengths),
         )
-        self._positions, self._stopped = state[0].reshape(-1, 3), state[1]
+        how = (bool(stop), 1 if few else self._threads, bits, sides)
         events = Events()
+        at: tuple[np.ndarray, NDArray[np.uint32]]
+        rows: tuple[np.ndarray, ...]
+        if isinstance(core, DoubleCore):
+            at, rows, events.walked, invalid = walk_double(core, *arrays, *how)
+        else:
+            at, rows, events.walked, invalid = walk(core, *arrays, *how)
+        self._positions, self._stopped = at[0].reshape(-1, 3), at[1]
         events.offsets, events.segment, events.t = rows[0], rows[1], rows[2]
         events.prim_id, events.geom_id, events.entering = rows[3], rows[4], rows[5]
-        events.walked = walked
         if invalid:
+            limit = "1e100 sizes of the scene" if isinstance(core, DoubleCore) else "1e30"
             warnings.warn(
                 f"{invalid} segments have no end and were left out: numbers that are NaN, infinite or "
-                f"beyond 1e30, or negative lengths",
+                f"beyond {limit}, or negative lengths",
                 InvalidRayWarning,
                 stacklevel=3,
             )

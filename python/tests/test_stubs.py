@@ -95,7 +95,8 @@ def test_examples(module):
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/python.md", "docs/coming-from.md"])
-def test_code_of_the_pages(page):
+def test_code_of_the_pages(page, tmp_path, monkeypatch):
+    # Some of it writes files.
     text = pathlib.Path(__file__).parents[2].joinpath(page).read_text()
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     assert blocks
@@ -103,6 +104,7 @@ def test_code_of_the_pages(page):
     origins, directions = rays(np.random.default_rng(1), 500, 1.0)
     names = dict(vertices=vertices, faces=faces, origins=origins, directions=directions)
     names["light"] = np.float32([0, 0, 9])
+    monkeypatch.chdir(tmp_path)
     for block in blocks:
         exec(compile(block, page, "exec"), names)
 

@@ -41,7 +41,7 @@ mod _ropewalk {
     #[pymodule_export]
     use crate::rays::Rays;
     #[pymodule_export]
-    use crate::walker::{cells_of, walk};
+    use crate::walker::{cells_of, walk, walk_double};
 
     /// NumPy's C interface is looked up when the first array is seen, and Ctrl-C in the middle of that would be
     /// a panic: so one is made here.

@@ -29,7 +29,7 @@ const FULL_TASK: usize = 1 << 22;
 
 /// What points are asked about.
 #[derive(FromPyObject)]
-enum Asked {
+pub enum Asked {
     Single(Py<Core>),
     Double(Py<DoubleCore>),
 }
@@ -82,6 +82,15 @@ macro_rules! ask {
             Queries::Double($name) => $answer,
         }
     };
+}
+
+impl Asked {
+    /// The cells of points, each to its own room; `None` where there are none: other primitives than triangles,
+    /// or instances.
+    pub fn locator(&self) -> Option<impl Fn(&[[f64; 3]]) -> Vec<Option<Cell>> + Sync + '_> {
+        let queries = self.queries().ok()?;
+        Some(move |points: &[[f64; 3]]| ask!(queries, queries => queries.locate(points)))
+    }
 }
 
 /// Answers points over the scene of a [`Core`] or the meshes of a [`DoubleCore`].

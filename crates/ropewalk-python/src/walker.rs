@@ -1,12 +1,15 @@
 //! Particles moved along segments, and cells to start from.
 
 use crate::core::{Core, block, blocks, masks_that_refuse, zeros};
+use crate::double::DoubleCore;
+use crate::faces::Faces;
+use crate::points::Asked;
 use crate::{error, rays, work};
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use ropewalk::Sides;
-use ropewalk::point::{Cell, PointQueries};
-use ropewalk::walker::{Crossed, CrossingFilter, Encounter, Events, Walker};
+use ropewalk::point::Cell;
+use ropewalk::walker::{Crossed, CrossingFilter, Encounter, Events, Walker, WalkerGeometry};
 use std::ops::Range;
 
 /// Particles of a task.
@@ -29,30 +32,40 @@ pub fn cell(number: i64) -> Option<Cell> {
 #[pyfunction]
 pub fn cells_of<'py>(
     py: Python<'py>,
-    core: &Core,
+    core: Asked,
     points: PyReadonlyArray1<'_, f64>,
     threads: usize,
 ) -> PyResult<Bound<'py, PyArray1<i64>>> {
     let (points, _) = points.as_slice()?.as_chunks::<3>();
     let mut cells = zeros::<i64>(points.len())?;
-    let Ok(queries) = PointQueries::new(core.tree(), core.geometry()) else {
-        // Other primitives than triangles: no cells, which is no more than a slower start.
+    let Some(locate) = core.locator() else {
+        // No cells, which is no more than a slower start.
         cells.fill(-1);
         return Ok(cells.into_pyarray(py));
     };
-    let queries = queries.with_threads(1);
     let tasks = points.chunks(POINTS).zip(cells.chunks_mut(POINTS)).collect();
     work::for_each(py, threads, tasks, |(points, cells): (&[[f64; 3]], &mut [i64])| {
-        for (to, cell) in cells.iter_mut().zip(queries.locate(points)) {
+        for (to, cell) in cells.iter_mut().zip(locate(points)) {
             *to = number(cell);
         }
     })?;
     Ok(cells.into_pyarray(py))
 }
 
+/// A scene of triangles in either precision.
+struct Meshes<'a, G: WalkerGeometry> {
+    tree: &'a G::Tree,
+    geometry: &'a G,
+    faces: &'a Faces,
+    /// Masks of the meshes.
+    masks: &'a [u32],
+}
+
 /// Masks of particles and meshes, and the sides that are met.
 struct Met<'a> {
-    core: &'a Core,
+    faces: &'a Faces,
+    /// Masks of the meshes.
+    meshes: &'a [u32],
     /// Number of the first particle.
     first: usize,
     /// One for all particles or one a particle.
@@ -70,40 +83,46 @@ impl CrossingFilter for Met<'_> {
         };
         side && self.masks.is_none_or(|masks| {
             // An altered file may name primitives that are not there.
-            let mesh = self.core.masks.get(self.core.faces().mesh(crossed.prim_id));
+            let mesh = self.meshes.get(self.faces.mesh(crossed.prim_id));
             rays::one(masks, self.first + particle) & mesh.copied().unwrap_or(!0) != 0
         })
     }
 
     #[inline]
     fn passes(&self, passed: u32, prim: u32) -> bool {
-        self.core.faces().of(passed) == self.core.faces().of(prim)
+        self.faces.of(passed) == self.faces.of(prim)
     }
 }
 
 /// Where particles are and at which faces they were stopped, afterwards.
-type State<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<u32>>);
+type State<'py, T> = (Bound<'py, PyArray1<T>>, Bound<'py, PyArray1<u32>>);
 
 /// Row starts, segments, parameters, primitives, meshes, and whether they are entered.
-type Rows<'py> = (
+type Rows<'py, T> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<i32>>,
-    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<T>>,
     Bound<'py, PyArray1<i32>>,
     Bound<'py, PyArray1<i32>>,
     Bound<'py, PyArray1<bool>>,
 );
 
 /// Positions of particles, and the triangles at which they were stopped.
-type Walked = (Vec<[f32; 3]>, Vec<u32>);
+type Walked<T> = (Vec<[T; 3]>, Vec<u32>);
+
+/// What a task is left with.
+type Part<T> = (Walked<T>, Events<T>);
 
 /// Row starts, directions and lengths of segments, and what is done at a triangle.
-type Segments<'a> = (&'a [usize], &'a [[f32; 3]], &'a [f32], Encounter);
+type Segments<'a, T> = (&'a [usize], &'a [[T; 3]], &'a [T], Encounter);
 
-fn moved<F: CrossingFilter>(
-    mut walker: Walker<'_, F>,
-    (rows, directions, lengths, encounter): Segments<'_>,
-) -> (Walked, Events) {
+/// What moved particles come back as: their state, events, segments begun, and how many have no end.
+type Moved<'py, T> = (State<'py, T>, Rows<'py, T>, Bound<'py, PyArray1<i32>>, usize);
+
+fn moved<F: CrossingFilter, G: WalkerGeometry>(
+    mut walker: Walker<'_, F, G>,
+    (rows, directions, lengths, encounter): Segments<'_, G::Float>,
+) -> Part<G::Float> {
     let events = walker.run(rows, directions, lengths, encounter);
     ((walker.positions().to_vec(), walker.stopped_at().to_vec()), events)
 }
@@ -124,7 +143,64 @@ pub fn walk<'py>(
     threads: usize,
     masks: Option<PyReadonlyArray1<'_, u32>>,
     faces: &str,
-) -> PyResult<(State<'py>, Rows<'py>, Bound<'py, PyArray1<i32>>, usize)> {
+) -> PyResult<Moved<'py, f32>> {
+    if core.tree().has_shapes() {
+        return Err(error::argument("scene", None, TRIANGLES.into()));
+    }
+    let (tree, geometry) = (core.tree(), core.geometry());
+    let meshes = Meshes { tree, geometry, faces: core.faces(), masks: &core.masks };
+    let arrays = (positions, stopped, offsets, directions, lengths);
+    walk_among(py, &meshes, arrays, stop, threads, masks, faces)
+}
+
+/// The same in `f64`.
+#[pyfunction]
+#[pyo3(signature = (core, positions, stopped, offsets, directions, lengths, stop, threads, masks=None, faces="both"))]
+pub fn walk_double<'py>(
+    py: Python<'py>,
+    core: &DoubleCore,
+    positions: PyReadonlyArray1<'_, f64>,
+    stopped: PyReadonlyArray1<'_, u32>,
+    offsets: PyReadonlyArray1<'_, i64>,
+    directions: PyReadonlyArray1<'_, f64>,
+    lengths: PyReadonlyArray1<'_, f64>,
+    stop: bool,
+    threads: usize,
+    masks: Option<PyReadonlyArray1<'_, u32>>,
+    faces: &str,
+) -> PyResult<Moved<'py, f64>> {
+    let object = core.object().ok_or_else(|| {
+        let instances = "scene: particles move among meshes; this one is of instances";
+        error::argument("scene", None, instances.into())
+    })?;
+    let (tree, geometry) = (&object.tree, &object.geometry);
+    let meshes = Meshes { tree, geometry, faces: core.faces(), masks: core.mesh_masks() };
+    let arrays = (positions, stopped, offsets, directions, lengths);
+    walk_among(py, &meshes, arrays, stop, threads, masks, faces)
+}
+
+/// Why a scene is refused.
+const TRIANGLES: &str =
+    "the scene holds other primitives than triangles and quads, which a Walker does not know";
+
+/// Positions, triangles at which particles were stopped, rows, directions and lengths.
+type Arrays<'py, T> = (
+    PyReadonlyArray1<'py, T>,
+    PyReadonlyArray1<'py, u32>,
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray1<'py, T>,
+    PyReadonlyArray1<'py, T>,
+);
+
+fn walk_among<'py, G: WalkerGeometry<Float: Element>>(
+    py: Python<'py>,
+    meshes: &Meshes<'_, G>,
+    (positions, stopped, offsets, directions, lengths): Arrays<'_, G::Float>,
+    stop: bool,
+    threads: usize,
+    masks: Option<PyReadonlyArray1<'_, u32>>,
+    faces: &str,
+) -> PyResult<Moved<'py, G::Float>> {
     let (positions, _) = positions.as_slice()?.as_chunks::<3>();
     let (directions, _) = directions.as_slice()?.as_chunks::<3>();
     let (stopped, lengths) = (stopped.as_slice()?, lengths.as_slice()?);
@@ -142,42 +218,38 @@ pub fn walk<'py>(
         let reason = "rows, directions, lengths and masks do not fit each other";
         return Err(error::argument("offsets", None, reason.into()));
     }
-    let triangles = "the scene holds other primitives than triangles, which a Walker does not know";
-    if core.tree().has_shapes() {
-        return Err(error::argument("scene", None, triangles.into()));
-    }
     let encounter = if stop { Encounter::Stop } else { Encounter::Pass };
     let tasks: Vec<Range<usize>> = blocks(n, block(n, threads, PARTICLES)).collect();
-    let masks = masks_that_refuse(&core.masks, masks, &(0..n));
-    let faces = core.faces();
+    let masks = masks_that_refuse(meshes.masks, masks, &(0..n));
+    let faces = meshes.faces;
     let is_plain = masks.is_none() && sides == Sides::Both && !faces.has_quads();
     let primitive = |&face: &u32| match face {
         u32::MAX => face,
         _ => faces.primitives(face).start,
     };
-    let run = |part: Range<usize>| -> Option<(Walked, Events)> {
+    let run = |part: Range<usize>| -> Option<Part<G::Float>> {
         let here = positions[part.clone()].to_vec();
-        let walker = Walker::new(core.tree(), core.geometry(), here).ok()?;
-        let walker = walker
-            .with_threads(1)
-            .with_stopped(stopped[part.clone()].iter().map(primitive).collect());
+        let walker = Walker::new(meshes.tree, meshes.geometry, here).ok()?;
+        let stopped = stopped[part.clone()].iter().map(primitive).collect();
+        let walker = walker.with_threads(1).with_stopped(stopped);
         let segments = (&offsets[part.start..=part.end], directions, lengths, encounter);
         Some(if is_plain {
             moved(walker, segments)
         } else {
-            moved(walker.with_filter(Met { core, first: part.start, masks, sides }), segments)
+            let met = Met { faces, meshes: meshes.masks, first: part.start, masks, sides };
+            moved(walker.with_filter(met), segments)
         })
     };
-    let parts: Option<Vec<(Walked, Events)>> =
+    let parts: Option<Vec<Part<G::Float>>> =
         work::for_each(py, threads, tasks, run)?.into_iter().collect();
-    let parts = parts.ok_or_else(|| error::argument("scene", None, triangles.into()))?;
+    let parts = parts.ok_or_else(|| error::argument("scene", None, TRIANGLES.into()))?;
 
     let found = parts.iter().map(|(_, events)| events.t.len()).sum();
-    let (mut at, mut on) = (zeros::<f32>(0)?, zeros::<u32>(0)?);
+    let (mut at, mut on) = (Vec::<G::Float>::new(), zeros::<u32>(0)?);
     at.reserve(3 * n);
     on.reserve(n);
     let (mut rows, mut walked) = (zeros::<i64>(n + 1)?, zeros::<i32>(0)?);
-    let (mut segment, mut t) = (zeros::<i32>(0)?, zeros::<f32>(0)?);
+    let (mut segment, mut t) = (zeros::<i32>(0)?, Vec::<G::Float>::new());
     let (mut prim, mut geom) = (zeros::<i32>(0)?, zeros::<i32>(found)?);
     let (mut entering, mut invalid, mut particle) = (vec![], 0, 0);
     for ((positions, stopped), events) in &parts {

@@ -22,7 +22,10 @@ pub struct Crossed {
 
 /// Where the segment from `p` to `q` crosses a triangle that is not degenerate: the share of the segment
 /// before that, and whether it goes from the front to the back.
-pub fn crossing(p: [f32; 3], q: [f32; 3], triangle: &[[f32; 3]; 3]) -> Option<(f64, bool)> {
+///
+/// No product of three coordinates may overflow, and neither it nor its rounding errors may underflow.
+#[inline]
+pub fn crossing(p: [f64; 3], q: [f64; 3], triangle: &[[f64; 3]; 3]) -> Option<(f64, bool)> {
     let apart = |i: usize| {
         let [a, b, c] = triangle.map(|v| v[i]);
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
@@ -31,8 +34,7 @@ pub fn crossing(p: [f32; 3], q: [f32; 3], triangle: &[[f32; 3]; 3]) -> Option<(f
     if apart(0) || apart(1) || apart(2) {
         return None;
     }
-    let [a, b, c] = triangle.map(|v| v.map(f64::from));
-    let (p, q) = (p.map(f64::from), q.map(f64::from));
+    let &[a, b, c] = triangle;
     let (from, to) = (side(a, b, c, p), side(a, b, c, q));
     if from == to {
         return None;
@@ -70,7 +72,7 @@ fn moved_turn(p: [f64; 3], q: [f64; 3], a: [f64; 3], b: [f64; 3]) -> i32 {
     steps.into_iter().find(|&n| n != 0).unwrap_or(0)
 }
 
-/// The sign of a component of the cross product of two differences of `f32` numbers.
+/// The sign of a component of the cross product of two differences.
 fn cross([x, y]: [usize; 2], [p, q]: [[f64; 3]; 2], [a, b]: [[f64; 3]; 2]) -> i32 {
     let m = (q[x] - p[x]) * (b[y] - a[y]);
     let n = (q[y] - p[y]) * (b[x] - a[x]);
@@ -78,11 +80,10 @@ fn cross([x, y]: [usize; 2], [p, q]: [[f64; 3]; 2], [a, b]: [[f64; 3]; 2]) -> i3
     if area.abs() > TURN_ERROR * size {
         return sign(area);
     }
-    // Products of two `f32` numbers are exact.
-    let mut sum = Expansion::<8>::new();
+    let mut sum = Expansion::<16>::new();
     for (from, to, factor) in [(p, a, 1.0), (p, b, -1.0), (q, a, -1.0), (q, b, 1.0)] {
-        sum.add(factor * from[x] * to[y]);
-        sum.add(-factor * from[y] * to[x]);
+        sum.add_product(factor * from[x], to[y]);
+        sum.add_product(-factor * from[y], to[x]);
     }
     sum.sign()
 }

@@ -1,29 +1,30 @@
 //! Particles with lists of segments, as the lanes of a wave take them.
 
-use super::{Crossed, CrossingFilter, Crossings, Encounter, end_of};
+use super::{Crossed, CrossingFilter, Crossings, Encounter, Float, WalkerGeometry, end_of};
 use crate::kernel::{Before, Crowd, WAVE};
 use crate::ray::Ray;
 
 /// A crossing of a particle.
 #[derive(Clone, Copy, Debug)]
-pub struct Record {
+pub struct Record<T> {
     /// The particle, counted from the first of the task.
     pub particle: u32,
     /// The segment of its list.
     pub segment: u32,
     /// Where on it, in lengths of its direction.
-    pub t: f32,
+    pub t: T,
     /// What it crosses.
     pub hit: Crossed,
 }
 
 /// The particles of a task.
-pub struct Lists<'a, F> {
+pub struct Lists<'a, F, G: WalkerGeometry> {
+    geometry: &'a G,
     /// Where the segments of each particle begin, and where the last ones end.
     offsets: &'a [usize],
-    directions: &'a [[f32; 3]],
-    lengths: &'a [f32],
-    positions: &'a mut [[f32; 3]],
+    directions: &'a [[G::Float; 3]],
+    lengths: &'a [G::Float],
+    positions: &'a mut [[G::Float; 3]],
     stopped: &'a mut [u32],
     /// Segments that each particle has behind it.
     walked: &'a mut [u32],
@@ -35,30 +36,31 @@ pub struct Lists<'a, F> {
     /// The particle of each lane.
     of: [usize; WAVE],
     /// Where its segment ends.
-    to: [[f32; 3]; WAVE],
+    to: [[G::Float; 3]; WAVE],
     /// The first particle not yet begun.
     next: usize,
-    records: Vec<Record>,
+    records: Vec<Record<G::Float>>,
     invalid: usize,
 }
 
 /// Positions, the triangles at which particles were stopped, and segments walked.
-type State<'a> = (&'a mut [[f32; 3]], &'a mut [u32], &'a mut [u32]);
+type State<'a, T> = (&'a mut [[T; 3]], &'a mut [u32], &'a mut [u32]);
 
-/// The ray of a segment begins earlier and ends later by this share of it. The filters bound their
-/// errors for a ray of exact direction; this one's is rounded, which moves parameters by less.
-const BEYOND: f32 = 1.0 / (1u32 << 16) as f32;
+/// Directions and lengths of segments.
+type Segments<'a, T> = (&'a [[T; 3]], &'a [T]);
 
-impl<'a, F: CrossingFilter> Lists<'a, F> {
+impl<'a, F: CrossingFilter, G: WalkerGeometry> Lists<'a, F, G> {
     /// Particles with their rows of segments, the first of which is number `first` of all.
     pub fn new(
+        geometry: &'a G,
         offsets: &'a [usize],
-        (directions, lengths): (&'a [[f32; 3]], &'a [f32]),
-        (positions, stopped, walked): State<'a>,
+        (directions, lengths): Segments<'a, G::Float>,
+        (positions, stopped, walked): State<'a, G::Float>,
         encounter: Encounter,
         (filter, first): (&'a F, usize),
     ) -> Self {
         Lists {
+            geometry,
             offsets,
             directions,
             lengths,
@@ -69,7 +71,7 @@ impl<'a, F: CrossingFilter> Lists<'a, F> {
             filter,
             first,
             of: [usize::MAX; WAVE],
-            to: [[0.0; 3]; WAVE],
+            to: [[G::Float::default(); 3]; WAVE],
             next: 0,
             records: Vec::new(),
             invalid: 0,
@@ -82,7 +84,7 @@ impl<'a, F: CrossingFilter> Lists<'a, F> {
     }
 
     /// All crossings, those of each particle in order, and the number of segments without an end.
-    pub fn into_records(self) -> (Vec<Record>, usize) {
+    pub fn into_records(self) -> (Vec<Record<G::Float>>, usize) {
         (self.records, self.invalid)
     }
 
@@ -100,12 +102,12 @@ impl<'a, F: CrossingFilter> Lists<'a, F> {
             |hit: &&Crossed| !filter.passes(passed, hit.prim_id) && filter.accepts(index, hit);
         for hit in crossed.iter().filter(counts) {
             let length = self.lengths[self.offsets[particle] + segment as usize];
-            let t = (hit.share * f64::from(length)) as f32;
+            let t = Float::rounded(hit.share * length.into());
             self.records.push(Record { particle: particle as u32, segment, t, hit: *hit });
             if self.encounter == Encounter::Stop {
                 let at = |a: usize| {
-                    let (from, to) = (f64::from(from[a]), f64::from(to[a]));
-                    (from + hit.share * (to - from)) as f32
+                    let (from, to): (f64, f64) = (from[a].into(), to[a].into());
+                    Float::rounded(from + hit.share * (to - from))
                 };
                 self.positions[particle] = std::array::from_fn(at);
                 self.stopped[particle] = hit.prim_id;
@@ -117,7 +119,7 @@ impl<'a, F: CrossingFilter> Lists<'a, F> {
 
     /// The next segment of the particle of a lane.
     #[inline(always)]
-    fn segment(&mut self, k: usize, query: &mut Crossings) -> Option<Ray> {
+    fn segment(&mut self, k: usize, query: &mut Crossings<'_, G>) -> Option<Ray> {
         let particle = self.of[k];
         let from = self.positions[particle];
         loop {
@@ -125,7 +127,8 @@ impl<'a, F: CrossingFilter> Lists<'a, F> {
             if at >= self.offsets[particle + 1] {
                 return None;
             }
-            let Some(to) = end_of(from, self.directions[at], self.lengths[at]) else {
+            let end = end_of(self.geometry, from, self.directions[at], self.lengths[at]);
+            let Some(to) = end else {
                 self.invalid += 1;
                 self.walked[particle] += 1;
                 continue;
@@ -136,15 +139,14 @@ impl<'a, F: CrossingFilter> Lists<'a, F> {
             }
             query.set(k, from, to);
             self.to[k] = to;
-            let dir = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
-            return Some(Ray::new(from, dir).with_range(-BEYOND, 1.0 + BEYOND));
+            return Some(self.geometry.search_ray(from, to));
         }
     }
 }
 
-impl<F: CrossingFilter> Crowd<Crossings> for Lists<'_, F> {
+impl<'a, F: CrossingFilter, G: WalkerGeometry> Crowd<Crossings<'a, G>> for Lists<'a, F, G> {
     #[inline(always)]
-    fn advance(&mut self, k: usize, query: &mut Crossings, before: Before) -> Option<Ray> {
+    fn advance(&mut self, k: usize, query: &mut Crossings<'a, G>, before: Before) -> Option<Ray> {
         let goes_on = match before {
             Before::Nothing => false,
             Before::Missed => !self.arrive(k, &[]),

@@ -3,23 +3,23 @@
 //! [`Walker`] holds many particles and moves each along a list of segments, many at once; [`crossings`]
 //! defines what it reports. Which triangles a segment crosses is decided without rounding, by a rule
 //! under which the segments of a particle join: nothing is crossed twice or not at all where one ends
-//! and the next begins, also in a face, on an edge or in a vertex. docs/numerics.md has the rule.
+//! and the next begins, also in a face, on an edge or in a vertex. docs/numerics.md has the rule. Positions are
+//! `f32`, or `f64` among the triangles of a [`DoubleGeometry`](crate::double::DoubleGeometry).
 //!
 //! Particles that decide by themselves where to go next are moved by
 //! [`BatchCaster::walk`](crate::kernel::BatchCaster::walk).
 
 mod crossing;
 mod lists;
+mod precision;
 
 pub use crossing::Crossed;
 pub(crate) use crossing::crossing;
+pub use precision::{Float, WalkerGeometry};
 
 use crate::geometry::Geometry;
 use crate::kernel::{BatchCaster, Crossings, Lanes, Level, Masks, NoFilter, WAVE, WalkReport};
-use crate::point::cells::locate;
-use crate::point::{Cell, PointError};
-use crate::primitive::{Primitive, Shape};
-use crate::wide::WideTree;
+use crate::point::{Cell, PointError, PointQueries};
 use lists::{Lists, Record};
 use rayon::prelude::*;
 
@@ -37,13 +37,13 @@ pub enum Encounter {
 /// the order of its segments, in each by the share of the segment before the crossing, and at equal
 /// shares by primitive.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Events {
+pub struct Events<T = f32> {
     /// Row starts; one more than there are particles.
     pub offsets: Vec<usize>,
     /// The segment, counted from the first of the particle's list.
     pub segment: Vec<u32>,
     /// Where on the segment, in lengths of its direction.
-    pub t: Vec<f32>,
+    pub t: Vec<T>,
     /// The triangle.
     pub prim_id: Vec<u32>,
     /// True if the particle goes from the front to the back of the triangle: into a body whose fronts
@@ -51,8 +51,8 @@ pub struct Events {
     pub entering: Vec<bool>,
     /// Segments that each particle began: all of its list, or fewer if it stopped.
     pub walked: Vec<u32>,
-    /// Segments left out since they have no end: a number that is NaN, infinite or beyond
-    /// [`LARGEST`], or a negative length.
+    /// Segments left out since they have no end: a number that is NaN, infinite or too large (see
+    /// [`end_of`]), or a negative length.
     pub invalid: usize,
     /// How the segments went; which way they go changes no event.
     pub report: WalkReport,
@@ -94,7 +94,7 @@ impl<F: Fn(usize, &Crossed) -> bool + Sync> CrossingFilter for F {
     }
 }
 
-/// Largest coordinate of a particle.
+/// Largest coordinate of a particle in `f32`.
 pub const LARGEST: f32 = 1e30;
 
 /// Particles that one task of a parallel batch moves.
@@ -102,73 +102,90 @@ const TASK: usize = 1024;
 
 /// All crossings of the segment from `from` to `to` in order, found by going through all triangles: the
 /// definition of what [`Walker`] reports.
-pub fn crossings(geometry: &Geometry, from: [f32; 3], to: [f32; 3]) -> Vec<Crossed> {
+pub fn crossings<G: WalkerGeometry>(
+    geometry: &G,
+    from: [G::Float; 3],
+    to: [G::Float; 3],
+) -> Vec<Crossed> {
+    let (from, to) = (geometry.scaled(from.map(Into::into)), geometry.scaled(to.map(Into::into)));
     let of = |prim_id: u32| {
-        let Shape::Triangle(triangle) = geometry.shape(prim_id) else { return None };
-        if triangle.is_degenerate() {
+        if !geometry.has_area(prim_id) {
             return None;
         }
-        let (share, entering) = crossing(from, to, &triangle.vertices)?;
+        let (share, entering) = crossing(from, to, &geometry.corners(prim_id)?)?;
         Some(Crossed { share, prim_id, entering })
     };
-    let mut found: Vec<Crossed> = (0..geometry.len() as u32).filter_map(of).collect();
+    let mut found: Vec<Crossed> = (0..geometry.count() as u32).filter_map(of).collect();
     found.sort_by(|a, b| a.share.total_cmp(&b.share).then(a.prim_id.cmp(&b.prim_id)));
     found
 }
 
-/// The end of a segment, rounded to `f32` once; `None` if it has none.
-pub fn end_of(from: [f32; 3], direction: [f32; 3], length: f32) -> Option<[f32; 3]> {
-    let end = |a: usize| f64::from(from[a]) + f64::from(direction[a]) * f64::from(length);
-    let to: [f32; 3] = std::array::from_fn(|a| end(a) as f32);
-    let fits = |p: &[f32; 3]| p.iter().all(|x| x.abs() <= LARGEST);
-    (length >= 0.0 && fits(&from) && fits(&to)).then_some(to)
+/// The end of a segment; `None` if it has none: a length that is negative or NaN, or a coordinate at either end that
+/// is NaN or beyond [`WalkerGeometry::LARGEST`] once it is scaled.
+///
+/// It is computed in `f64` as `from + direction * length` with a rounding for each operation, and in a scene in
+/// `f32` rounded to `f32` then (the product is exact there).
+#[inline(always)]
+pub fn end_of<G: WalkerGeometry>(
+    geometry: &G,
+    from: [G::Float; 3],
+    direction: [G::Float; 3],
+    length: G::Float,
+) -> Option<[G::Float; 3]> {
+    let end = |a: usize| from[a].into() + direction[a].into() * length.into();
+    let to: [G::Float; 3] = std::array::from_fn(|a| G::Float::rounded(end(a)));
+    let fits =
+        |p: [G::Float; 3]| geometry.scaled(p.map(Into::into)).iter().all(|x| x.abs() <= G::LARGEST);
+    (length.into() >= 0.0 && fits(from) && fits(to)).then_some(to)
 }
 
 /// Particles in a scene of triangles.
 ///
-/// Positions are `f32`. A segment leads from where its particle is to [`end_of`] its direction and
+/// Positions are `f32`, or `f64` over a [`DoubleGeometry`](crate::double::DoubleGeometry). A segment leads from where its particle is to [`end_of`] its direction and
 /// length; what it crosses is what [`crossings`] says about these two points, whatever the level, the
 /// number of threads and the other particles. On which sides a triangle can be hit does not matter, and
 /// triangles without area are never met.
 ///
 /// A particle that is stopped stands where the segment crosses the triangle, rounded, and its next segment
 /// passes this triangle without a further event, to either side.
-pub struct Walker<'a, F = NoFilter> {
+pub struct Walker<'a, F = NoFilter, G: WalkerGeometry = Geometry> {
     caster: BatchCaster<'a>,
     filter: F,
-    tree: &'a WideTree,
-    positions: Vec<[f32; 3]>,
+    tree: &'a G::Tree,
+    geometry: &'a G,
+    positions: Vec<[G::Float; 3]>,
     /// The triangle at which each particle was stopped, which its next segment passes; `u32::MAX` for
     /// none.
     stopped: Vec<u32>,
 }
 
-impl<'a> Walker<'a> {
+impl<'a, G: WalkerGeometry> Walker<'a, NoFilter, G> {
     /// Particles at these positions, moved at the best level of this machine on all threads of the
-    /// current rayon pool.
+    /// current rayon pool. `tree` must have been built over `geometry`.
     ///
     /// # Errors
     /// [`PointError::NotTriangles`] if a leaf of the tree holds anything but triangles.
     pub fn new(
-        tree: &'a WideTree,
-        geometry: &'a Geometry,
-        positions: Vec<[f32; 3]>,
+        tree: &'a G::Tree,
+        geometry: &'a G,
+        positions: Vec<[G::Float; 3]>,
     ) -> Result<Self, PointError> {
-        if tree.has_shapes() {
+        let wide = G::wide(tree);
+        if wide.has_shapes() {
             return Err(PointError::NotTriangles);
         }
         let stopped = vec![u32::MAX; positions.len()];
-        let caster = BatchCaster::new(tree, geometry);
-        Ok(Walker { caster, filter: NoFilter, tree, positions, stopped })
+        let caster = BatchCaster::new(wide, geometry.of_kernels());
+        Ok(Walker { caster, filter: NoFilter, tree, geometry, positions, stopped })
     }
 }
 
-impl<'a, F: CrossingFilter> Walker<'a, F> {
+impl<'a, F: CrossingFilter, G: WalkerGeometry> Walker<'a, F, G> {
     /// The same with a filter that decides which crossings count: a closure of the particle's index and the
     /// crossing, or [`Masks`].
-    pub fn with_filter<G: CrossingFilter>(self, filter: G) -> Walker<'a, G> {
-        let Walker { caster, tree, positions, stopped, .. } = self;
-        Walker { caster, filter, tree, positions, stopped }
+    pub fn with_filter<H: CrossingFilter>(self, filter: H) -> Walker<'a, H, G> {
+        let Walker { caster, tree, geometry, positions, stopped, .. } = self;
+        Walker { caster, filter, tree, geometry, positions, stopped }
     }
 
     /// The same with another level, or `None` if this machine lacks it.
@@ -182,7 +199,7 @@ impl<'a, F: CrossingFilter> Walker<'a, F> {
     }
 
     /// Where the particles are.
-    pub fn positions(&self) -> &[[f32; 3]] {
+    pub fn positions(&self) -> &[[G::Float; 3]] {
         &self.positions
     }
 
@@ -205,18 +222,18 @@ impl<'a, F: CrossingFilter> Walker<'a, F> {
     ///
     /// # Panics
     /// If there are more or fewer.
-    pub fn set_positions(&mut self, positions: &[[f32; 3]]) {
+    pub fn set_positions(&mut self, positions: &[[G::Float; 3]]) {
         self.positions.copy_from_slice(positions);
         self.stopped.fill(u32::MAX);
     }
 
     /// The leaves in which the particles are; `None` outside of the tree's box.
     pub fn cells(&self) -> Vec<Option<Cell>> {
-        let cell = |p: &[f32; 3]| locate(self.tree, p.map(f64::from));
-        if self.caster.threads() == 1 {
-            return self.positions.iter().map(cell).collect();
-        }
-        self.positions.par_iter().with_min_len(TASK).map(cell).collect()
+        let Ok(queries) = PointQueries::new(self.tree, self.geometry) else {
+            return vec![None; self.positions.len()];
+        };
+        let points: Vec<[f64; 3]> = self.positions.iter().map(|p| p.map(Into::into)).collect();
+        queries.with_threads(self.caster.threads()).locate(&points)
     }
 
     /// Moves each particle along one segment: a direction, which need not be normalised, and a length in
@@ -226,10 +243,10 @@ impl<'a, F: CrossingFilter> Walker<'a, F> {
     /// If there are more or fewer directions or lengths than particles.
     pub fn advance(
         &mut self,
-        directions: &[[f32; 3]],
-        lengths: &[f32],
+        directions: &[[G::Float; 3]],
+        lengths: &[G::Float],
         encounter: Encounter,
-    ) -> Events {
+    ) -> Events<G::Float> {
         let offsets: Vec<usize> = (0..=self.positions.len()).collect();
         self.run(&offsets, directions, lengths, encounter)
     }
@@ -243,10 +260,10 @@ impl<'a, F: CrossingFilter> Walker<'a, F> {
     pub fn run(
         &mut self,
         offsets: &[usize],
-        directions: &[[f32; 3]],
-        lengths: &[f32],
+        directions: &[[G::Float; 3]],
+        lengths: &[G::Float],
         encounter: Encounter,
-    ) -> Events {
+    ) -> Events<G::Float> {
         let n = self.positions.len();
         assert!(offsets.len() == n + 1 && offsets.is_sorted(), "one row a particle");
         assert!(directions.len() == lengths.len(), "one length a direction");
@@ -254,24 +271,25 @@ impl<'a, F: CrossingFilter> Walker<'a, F> {
         let mut walked = vec![0u32; n];
         let serial = self.caster.threads() == 1 || n <= TASK;
         let task = if serial { n.max(1) } else { TASK };
-        let (caster, filter) = (self.caster, &self.filter);
+        let (caster, geometry, filter) = (self.caster, self.geometry, &self.filter);
         let parts = self.positions.chunks_mut(task).zip(self.stopped.chunks_mut(task));
         let parts = parts.zip(walked.chunks_mut(task)).enumerate();
-        let tasks: Vec<Lists<'_, F>> = parts
+        let tasks: Vec<Lists<'_, F, G>> = parts
             .map(|(i, ((positions, stopped), walked))| {
                 let rows = &offsets[i * task..=i * task + positions.len()];
                 let state = (positions, stopped, walked);
-                Lists::new(rows, (directions, lengths), state, encounter, (filter, i * task))
+                let segments = (directions, lengths);
+                Lists::new(geometry, rows, segments, state, encounter, (filter, i * task))
             })
             .collect();
-        let run = |lists: Lists<'_, F>| {
+        let run = |lists: Lists<'_, F, G>| {
             let width = lists.len().min(WAVE);
             let mut lanes = Lanes::new(caster.tree(), width, lists);
-            caster.run_lanes(width, &mut Crossings::new(), &mut lanes);
+            caster.run_lanes(width, &mut Crossings::new(geometry), &mut lanes);
             let (lists, report) = lanes.into_parts();
             (lists.into_records(), report)
         };
-        let parts: Vec<((Vec<Record>, usize), WalkReport)> = if serial {
+        let parts: Vec<Part<G::Float>> = if serial {
             tasks.into_iter().map(run).collect()
         } else {
             tasks.into_par_iter().map(run).collect()
@@ -280,13 +298,16 @@ impl<'a, F: CrossingFilter> Walker<'a, F> {
     }
 }
 
+/// What a task met, segments without an end, and how its segments went.
+type Part<T> = ((Vec<Record<T>>, usize), WalkReport);
+
 /// The rows of all tasks.
-fn gather(parts: &[((Vec<Record>, usize), WalkReport)], task: usize, walked: Vec<u32>) -> Events {
+fn gather<T: Float>(parts: &[Part<T>], task: usize, walked: Vec<u32>) -> Events<T> {
     let total = parts.iter().map(|((records, _), _)| records.len()).sum();
     let mut events = Events {
         offsets: vec![0; walked.len() + 1],
         segment: vec![0; total],
-        t: vec![0.0; total],
+        t: vec![T::default(); total],
         prim_id: vec![0; total],
         entering: vec![false; total],
         walked,

@@ -11,4 +11,5 @@ mod ropes;
 mod scenes;
 mod shapes;
 mod walker;
+mod walker_double;
 mod wave;

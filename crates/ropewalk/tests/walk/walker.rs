@@ -5,32 +5,46 @@ use crate::scenes;
 use ropewalk::kernel::{Arrival, BatchCaster, Level, Masks, Particle};
 use ropewalk::point::{PointQueries, Side};
 use ropewalk::primitive::Triangle;
-use ropewalk::walker::{Crossed, Encounter, Events, Walker, crossings, end_of};
+use ropewalk::walker::{
+    Crossed, Encounter, Events, Float, Walker, WalkerGeometry, crossings, end_of,
+};
 use ropewalk::wide::WideTree;
-use ropewalk::{Aabb, Geometry, Ray, Shape, Sides};
+use ropewalk::{Geometry, Ray, Shape, Sides};
 use ropewalk_testkit::rays::Draw;
 use ropewalk_testkit::trees::{TreeShape, random_tree};
 
 /// Particles with lists of segments.
-struct Crowd {
-    positions: Vec<[f32; 3]>,
-    offsets: Vec<usize>,
-    directions: Vec<[f32; 3]>,
-    lengths: Vec<f32>,
+pub struct Crowd<T> {
+    pub positions: Vec<[T; 3]>,
+    pub offsets: Vec<usize>,
+    pub directions: Vec<[T; 3]>,
+    pub lengths: Vec<T>,
+}
+
+/// A direction with all digits of an `f64`.
+fn direction<T: Float>(draw: &mut Draw) -> [T; 3] {
+    draw.direction().map(|x| T::rounded(f64::from(x) * draw.uniform(1.0, 1.0 + 1e-6)))
 }
 
 /// Chains of segments: generic ones, others that end at coordinates of the scene, so in faces, edges and
 /// vertices, and some that turn there or run along them.
-fn crowd(draw: &mut Draw, bounds: &Aabb, values: &[Vec<f32>; 3], particles: usize) -> Crowd {
-    let size = bounds.diagonal();
+pub fn crowd<G: WalkerGeometry>(
+    draw: &mut Draw,
+    geometry: &G,
+    (low, high): ([f64; 3], [f64; 3]),
+    values: &[Vec<G::Float>; 3],
+    particles: usize,
+) -> Crowd<G::Float> {
+    let size = (0..3).map(|a| (high[a] - low[a]).powi(2)).sum::<f64>().sqrt();
+    let number = G::Float::rounded;
     let mut crowd = Crowd {
         positions: Vec::new(),
         offsets: vec![0],
         directions: Vec::new(),
         lengths: Vec::new(),
     };
-    let snapped = |draw: &mut Draw, share: f64| -> [f32; 3] {
-        let mut p = draw.point_in(bounds);
+    let snapped = |draw: &mut Draw, share: f64| -> [G::Float; 3] {
+        let mut p = std::array::from_fn(|a| number(draw.uniform(low[a], high[a])));
         for (a, x) in p.iter_mut().enumerate() {
             if draw.chance(share) && !values[a].is_empty() {
                 *x = values[a][draw.below(values[a].len())];
@@ -46,26 +60,32 @@ fn crowd(draw: &mut Draw, bounds: &Aabb, values: &[Vec<f32>; 3], particles: usiz
                 0..3 => {
                     // To a point of the scene: the difference may be rounded.
                     let to = snapped(draw, 0.9);
-                    (std::array::from_fn(|a| to[a] - at[a]), 1.0)
+                    let go = |a: usize| number(to[a].into() - at[a].into());
+                    (std::array::from_fn(go), number(1.0))
                 }
-                3 => (draw.direction(), (size * draw.uniform(-12.0, 0.0).exp2()) as f32),
+                3 => (direction(draw), number(size * draw.uniform(-12.0, 0.0).exp2())),
                 4 => {
                     // Back along the last segment.
-                    let last = crowd.directions.last().copied().unwrap_or([1.0, 0.0, 0.0]);
-                    let back = if draw.chance(0.5) { 1.0 } else { draw.uniform(0.0, 2.0) as f32 };
-                    (last.map(|x| -x), crowd.lengths.last().map_or(1.0, |l| l * back))
+                    let last =
+                        crowd.directions.last().map_or([1.0, 0.0, 0.0], |d| d.map(Into::into));
+                    let back = if draw.chance(0.5) { 1.0 } else { draw.uniform(0.0, 2.0) };
+                    let length = crowd.lengths.last().map_or(1.0, |&l| l.into() * back);
+                    (last.map(|x: f64| number(-x)), number(length))
                 }
                 5 => {
-                    let mut direction = [0.0; 3];
-                    direction[draw.below(3)] = if draw.chance(0.5) { 1.0 } else { -1.0 };
-                    (direction, (size * draw.uniform(-3.0, 0.0).exp2()).round() as f32)
+                    let mut direction = [number(0.0); 3];
+                    direction[draw.below(3)] = number(if draw.chance(0.5) { 1.0 } else { -1.0 });
+                    (direction, number((size * draw.uniform(-3.0, 0.0).exp2()).round()))
                 }
-                6 => (draw.direction(), 0.0),
-                _ => (draw.direction().map(|x| 100.0 * x), (size * 1e-3) as f32),
+                6 => (direction(draw), number(0.0)),
+                _ => {
+                    let far: [f64; 3] = direction(draw);
+                    (far.map(|x| number(100.0 * x)), number(size * 1e-3))
+                }
             };
             crowd.directions.push(direction);
             crowd.lengths.push(length);
-            at = end_of(at, direction, length).unwrap_or(at);
+            at = end_of(geometry, at, direction, length).unwrap_or(at);
         }
         crowd.offsets.push(crowd.lengths.len());
     }
@@ -73,26 +93,27 @@ fn crowd(draw: &mut Draw, bounds: &Aabb, values: &[Vec<f32>; 3], particles: usiz
 }
 
 /// What a particle meets, by the definition: events, the end, segments begun, and where it was stopped.
-type Walked = (Vec<(u32, f32, u32, bool)>, [f32; 3], u32, u32);
+type Walked<T> = (Vec<(u32, T, u32, bool)>, [T; 3], u32, u32);
 
-fn expected(
-    geometry: &Geometry,
-    crowd: &Crowd,
+fn expected<G: WalkerGeometry>(
+    geometry: &G,
+    crowd: &Crowd<G::Float>,
     i: usize,
     encounter: Encounter,
     filter: impl Fn(usize, &Crossed) -> bool,
-) -> Walked {
+) -> Walked<G::Float> {
     let (mut at, mut stopped, mut events) = (crowd.positions[i], u32::MAX, Vec::new());
     let row = crowd.offsets[i]..crowd.offsets[i + 1];
     for (segment, s) in row.clone().enumerate() {
-        let Some(to) = end_of(at, crowd.directions[s], crowd.lengths[s]) else { continue };
+        let end = end_of(geometry, at, crowd.directions[s], crowd.lengths[s]);
+        let Some(to) = end else { continue };
         if to == at {
             continue;
         }
         let met = crossings(geometry, at, to);
         let mut met = met.iter().filter(|hit| hit.prim_id != stopped && filter(i, hit));
         let event = |hit: &Crossed| {
-            let t = (hit.share * f64::from(crowd.lengths[s])) as f32;
+            let t = Float::rounded(hit.share * crowd.lengths[s].into());
             (segment as u32, t, hit.prim_id, hit.entering)
         };
         if encounter == Encounter::Stop
@@ -100,8 +121,8 @@ fn expected(
         {
             events.push(event(hit));
             let place = |a: usize| {
-                let (from, to) = (f64::from(at[a]), f64::from(to[a]));
-                (from + hit.share * (to - from)) as f32
+                let (from, to): (f64, f64) = (at[a].into(), to[a].into());
+                Float::rounded(from + hit.share * (to - from))
             };
             return (events, std::array::from_fn(place), segment as u32 + 1, hit.prim_id);
         }
@@ -111,27 +132,27 @@ fn expected(
     (events, at, row.len() as u32, stopped)
 }
 
-fn row(events: &Events, i: usize) -> Vec<(u32, f32, u32, bool)> {
+pub fn row<T: Float>(events: &Events<T>, i: usize) -> Vec<(u32, T, u32, bool)> {
     (events.offsets[i]..events.offsets[i + 1])
         .map(|e| (events.segment[e], events.t[e], events.prim_id[e], events.entering[e]))
         .collect()
 }
 
 /// Runs a crowd at every level and compares with the definition; the number of events.
-fn check<F: Fn(usize, &Crossed) -> bool + Copy + Sync>(
-    geometry: &Geometry,
-    wide: &WideTree,
-    crowd: &Crowd,
+pub fn check<G: WalkerGeometry, F: Fn(usize, &Crossed) -> bool + Copy + Sync>(
+    geometry: &G,
+    tree: &G::Tree,
+    crowd: &Crowd<G::Float>,
     filter: F,
 ) -> usize {
     let mut met = 0;
     for encounter in [Encounter::Pass, Encounter::Stop] {
-        let first: Vec<Walked> = (0..crowd.positions.len())
+        let first: Vec<Walked<G::Float>> = (0..crowd.positions.len())
             .map(|i| expected(geometry, crowd, i, encounter, filter))
             .collect();
         for level in Level::ALL {
             for threads in [0, 1] {
-                let walker = Walker::new(wide, geometry, crowd.positions.clone()).unwrap();
+                let walker = Walker::new(tree, geometry, crowd.positions.clone()).unwrap();
                 let Some(walker) = walker.with_level(level) else { continue };
                 let mut walker = walker.with_filter(filter).with_threads(threads);
                 let events =
@@ -159,7 +180,9 @@ fn each(seed: u64, scene: impl Fn(&mut Draw) -> Geometry) {
         let tree = random_tree(&mut draw, &geometry, shape).unwrap();
         let wide = WideTree::compile(&tree, &geometry).unwrap();
         let bench = Bench::new(geometry.clone().into(), tree.into());
-        let crowd = crowd(&mut draw, &geometry.bounds(), &coordinates(&bench), 80);
+        let bounds = geometry.bounds();
+        let bounds = (bounds.min.map(f64::from), bounds.max.map(f64::from));
+        let crowd = crowd(&mut draw, &geometry, bounds, &coordinates(&bench), 80);
         met += check(&geometry, &wide, &crowd, |_, _| true);
         filtered += check(&geometry, &wide, &crowd, |particle, hit| {
             hit.entering == (particle % 2 == 0)
@@ -241,7 +264,7 @@ fn closed_bodies_are_left_as_often_as_entered() {
 }
 
 /// The same decisions in integers, written without regard to the library's.
-fn crosses_in_integers(p: [i128; 3], q: [i128; 3], triangle: [[i128; 3]; 3]) -> Option<bool> {
+pub fn crosses_in_integers(p: [i128; 3], q: [i128; 3], triangle: [[i128; 3]; 3]) -> Option<bool> {
     type V = [i128; 3];
     // Enough for numbers up to 8: a step is smaller than any product of those before it.
     const STEPS: V = [1 << 60, 1 << 30, 1];

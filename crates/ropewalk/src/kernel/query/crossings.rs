@@ -8,34 +8,34 @@ use crate::kernel::level::Simd;
 use crate::kernel::slot::Slot;
 use crate::kernel::wave::WAVE;
 use crate::ray::Hit;
-use crate::walker::{Crossed, crossing};
+use crate::walker::{Crossed, WalkerGeometry, crossing};
 use crate::wide::{Block, ID_MASK, LEAF, Treelet, WIDTH, WideTree, code_line};
 
 /// All crossings of the segments under way, in order.
-#[derive(Default)]
-pub struct Crossings {
-    lanes: Vec<Lane>,
+pub struct Crossings<'a, G: WalkerGeometry> {
+    geometry: &'a G,
+    lanes: Vec<Lane<G::Float>>,
 }
 
 /// A segment under way.
 #[derive(Clone, Default)]
-struct Lane {
-    from: [f32; 3],
-    to: [f32; 3],
+struct Lane<T> {
+    from: [T; 3],
+    to: [T; 3],
     /// Where triangles lie that it may cross.
     found: Vec<At>,
     crossed: Vec<Crossed>,
 }
 
-impl Crossings {
+impl<'a, G: WalkerGeometry> Crossings<'a, G> {
     /// No segments.
-    pub fn new() -> Self {
-        Crossings { lanes: vec![Lane::default(); WAVE] }
+    pub fn new(geometry: &'a G) -> Self {
+        Crossings { geometry, lanes: vec![Lane::default(); WAVE] }
     }
 
     /// The next segment of a lane.
     #[inline(always)]
-    pub fn set(&mut self, k: usize, from: [f32; 3], to: [f32; 3]) {
+    pub fn set(&mut self, k: usize, from: [G::Float; 3], to: [G::Float; 3]) {
         (self.lanes[k].from, self.lanes[k].to) = (from, to);
     }
 
@@ -46,12 +46,14 @@ impl Crossings {
 }
 
 /// The corners of a triangle in a block.
-fn corners(block: &Block, lane: usize) -> [[f32; 3]; 3] {
-    block.vertex.map(|axes| axes.map(|row| row[lane]))
+#[inline(always)]
+fn corners(block: &Block, lane: usize) -> [[f64; 3]; 3] {
+    [0, 1, 2].map(|vertex| [0, 1, 2].map(|axis| f64::from(block.vertex[vertex][axis][lane])))
 }
 
-impl BatchQuery for Crossings {
+impl<G: WalkerGeometry> BatchQuery for Crossings<'_, G> {
     const ANY: bool = false;
+    const ROUNDED: bool = G::ROUNDED;
     const CANDIDATES: bool = true;
 
     #[inline(always)]
@@ -77,10 +79,21 @@ impl BatchQuery for Crossings {
     fn finish(&mut self, k: usize, _slot: &mut Slot, exact: &Exact<'_>) {
         let Lane { from, to, found, crossed } = &mut self.lanes[k];
         crossed.clear();
+        if found.is_empty() {
+            return;
+        }
+        let from = self.geometry.scaled(from.map(Into::into));
+        let to = self.geometry.scaled(to.map(Into::into));
         for at in found.drain(..) {
             let (block, lane) = (exact.lines.block(at as usize / WIDTH), at as usize % WIDTH);
             let prim_id = block.id[lane] & ID_MASK;
-            if let Some((share, entering)) = crossing(*from, *to, &corners(block, lane)) {
+            let corners = if G::ROUNDED {
+                self.geometry.corners(prim_id)
+            } else {
+                Some(corners(block, lane))
+            };
+            let met = corners.and_then(|corners| crossing(from, to, &corners));
+            if let Some((share, entering)) = met {
                 crossed.push(Crossed { share, prim_id, entering });
             }
         }
@@ -100,8 +113,15 @@ impl BatchQuery for Crossings {
     #[cold]
     fn gather(&mut self, tree: &WideTree, k: usize) {
         let Lane { from, to, found, .. } = &mut self.lanes[k];
-        let low: [f32; 3] = std::array::from_fn(|a| from[a].min(to[a]));
-        let high: [f32; 3] = std::array::from_fn(|a| from[a].max(to[a]));
+        let from = self.geometry.placed(from.map(Into::into));
+        let to = self.geometry.placed(to.map(Into::into));
+        let low: [f64; 3] = std::array::from_fn(|a| from[a].min(to[a]));
+        let high: [f64; 3] = std::array::from_fn(|a| from[a].max(to[a]));
+        let outer = tree.outer_box();
+        let apart = |a: usize| high[a] < outer.min[a].into() || low[a] > outer.max[a].into();
+        if (0..3).any(apart) {
+            return;
+        }
         let mut stack = vec![tree.root()];
         while let Some(code) = stack.pop() {
             if code == 0 {
@@ -124,11 +144,11 @@ impl BatchQuery for Crossings {
 }
 
 /// True if a box touches the closed cell of a child of a treelet.
-fn reaches(treelet: &Treelet, child: usize, low: &[f32; 3], high: &[f32; 3]) -> bool {
+fn reaches(treelet: &Treelet, child: usize, low: &[f64; 3], high: &[f64; 3]) -> bool {
     let mut heap = 0;
     for level in 0..3 {
         let upper = child >> (2 - level) & 1;
-        let (axis, plane) = (treelet.axis(heap), treelet.plane[heap]);
+        let (axis, plane) = (treelet.axis(heap), f64::from(treelet.plane[heap]));
         if if upper == 1 { high[axis] < plane } else { low[axis] > plane } {
             return false;
         }
