@@ -53,7 +53,7 @@ fn every_method_equals_brute_force(spd: Spd, size: u32) {
         }
         if method.name == Method::DEFAULT {
             let wide = WideTree::compile(&tree, &geometry).unwrap();
-            assert_eq!(wide.validate(&tree), Ok(()));
+            assert_eq!(wide.validate(&tree, &geometry), Ok(()));
             check_batch(&BatchCaster::new(&wide, &geometry), &rays, &expected);
         }
     }

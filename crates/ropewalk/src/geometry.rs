@@ -68,6 +68,8 @@ pub struct Geometry {
     stored: Option<Arc<StoredTriangles>>,
     bounds: Option<Aabb>,
     degenerate: usize,
+    /// Primitives that are no triangles.
+    others: usize,
 }
 
 impl Geometry {
@@ -127,6 +129,7 @@ impl Geometry {
             return Err(GeometryError::NotFinite { index, what: "bounding box" });
         }
         self.degenerate += usize::from(shape.is_degenerate());
+        self.others += usize::from(!matches!(shape, Shape::Triangle(_)));
         self.bounds = Some(self.bounds.map_or(b, |s| s.union(&b)));
         self.shapes.push(shape);
         self.sides.push(sides);
@@ -164,6 +167,11 @@ impl Geometry {
     /// How many primitives have no area; they are kept and never hit.
     pub fn degenerate_count(&self) -> usize {
         self.degenerate
+    }
+
+    /// True if there is anything but triangles.
+    pub fn has_shapes(&self) -> bool {
+        self.others > 0
     }
 
     /// The box of everything; [`Aabb::EMPTY`] without primitives.

@@ -194,7 +194,7 @@ fn the_wide_tree_is_that_of_the_binary_one_for_any_number_of_threads() {
             let settings = BuildSettings { threads, ..BuildSettings::preset(Preset::Balanced) };
             let (tree, binary) = build(&geometry, &settings, &()).expect("settings in range");
             let (wide, report) = WideTree::build(&geometry, &settings, &()).unwrap();
-            assert_eq!(wide.validate(&tree), Ok(()));
+            assert_eq!(wide.validate(&tree, &geometry), Ok(()));
             assert_eq!(wide.has_shapes(), has_shapes);
             assert_eq!((report.tree, report.stops), (binary.tree, binary.stops));
             let compiled = WideTree::compile(&tree, &geometry).unwrap();

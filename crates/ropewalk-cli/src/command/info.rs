@@ -2,7 +2,9 @@
 
 use crate::output::{print_json, thousands};
 use crate::saved;
-use ropewalk::file::{AnyOpened, FORMAT_VERSION, LAYOUT_VERSION, Opened, Tag, short};
+use ropewalk::file::{
+    AnyOpened, FORMAT_VERSION, LAYOUT_VERSION, Opened, SHAPES_LAYOUT_VERSION, Tag, short,
+};
 use ropewalk::wide::WideTree;
 use serde::Serialize;
 use std::time::Instant;
@@ -163,7 +165,10 @@ impl Output {
             file: args.file.clone(),
             bytes: scene.bytes,
             format_version: FORMAT_VERSION,
-            layout_version: LAYOUT_VERSION,
+            layout_version: match tree.has_shapes() {
+                true => SHAPES_LAYOUT_VERSION,
+                false => LAYOUT_VERSION,
+            },
             verified: args.verify,
             geometry_hash: short(&scene.geometry_hash),
             precision,

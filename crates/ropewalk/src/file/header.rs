@@ -12,6 +12,14 @@ pub const MAGIC: [u8; 8] = *b"ROPEWALK";
 pub const FORMAT_VERSION: u32 = 1;
 /// Version of treelets and blocks.
 pub const LAYOUT_VERSION: u32 = 1;
+
+/// The same of a tree that holds other primitives than triangles: blocks have bounds of these.
+pub const SHAPES_LAYOUT_VERSION: u32 = 2;
+
+/// The version of a tree's layout.
+fn layout_version(has_shapes: bool) -> u32 {
+    if has_shapes { SHAPES_LAYOUT_VERSION } else { LAYOUT_VERSION }
+}
 /// Bytes of the header, without the table of sections that follows it.
 pub const HEADER_BYTES: usize = 192;
 /// Sections begin at multiples of it, and so does the address of a file's first byte.
@@ -166,7 +174,8 @@ impl Header {
         let mut bytes = Vec::with_capacity(prefix_bytes(self.sections.len()));
         let mut put = |part: &[u8]| bytes.extend_from_slice(part);
         put(&MAGIC);
-        for number in [BYTE_ORDER, FORMAT_VERSION, LAYOUT_VERSION, self.sections.len() as u32] {
+        let layout = layout_version(self.has_shapes);
+        for number in [BYTE_ORDER, FORMAT_VERSION, layout, self.sections.len() as u32] {
             put(&number.to_le_bytes());
         }
         put(&self.file_bytes().to_le_bytes());
@@ -211,7 +220,7 @@ impl Header {
         }
         check("the mark of the byte order", 8, word(8), BYTE_ORDER)?;
         version("format", 12, word(12), FORMAT_VERSION)?;
-        version("tree layout", 16, word(16), LAYOUT_VERSION)?;
+        version("tree layout", 16, word(16), layout_version(word(148) & HAS_SHAPES != 0))?;
         let count = word(20) as usize;
         if count > MAX_SECTIONS {
             return Err(value(

@@ -17,8 +17,8 @@ pub use error::{FileError, Part, WriteError};
 pub use figures::Figures;
 pub(crate) use header::Header;
 pub use header::{
-    FORMAT_VERSION, HEADER_BYTES, LAYOUT_VERSION, MAGIC, MAX_SECTIONS, SECTION_ALIGNMENT, Section,
-    Tag,
+    FORMAT_VERSION, HEADER_BYTES, LAYOUT_VERSION, MAGIC, MAX_SECTIONS, SECTION_ALIGNMENT,
+    SHAPES_LAYOUT_VERSION, Section, Tag,
 };
 pub use open::{AnyOpened, Check, Extra, Opened, OpenedDouble, open, open_any, open_monitored};
 pub use shapes::{ShapeRows, read_shapes, write_shapes};

@@ -6,6 +6,7 @@
 use super::beam::{Eight, FourDoubles};
 use super::level::{Found, Nearest, Range, Root, Simd};
 use super::look::look;
+use super::near::near;
 use super::slot::{Loaded, Slot};
 use super::x86::{self, Children, Lanes};
 use crate::ray::Ray;
@@ -76,6 +77,12 @@ impl Simd for Avx2 {
     unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32 {
         // SAFETY: passed on to the caller.
         unsafe { look::<Eight, ROUNDED, WHOLE>(slot, block) }
+    }
+
+    #[inline(always)]
+    unsafe fn near(slot: &Slot, ray: &Ray, block: &Block) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe { near::<Eight>(slot, ray, block) }
     }
 
     #[inline(always)]

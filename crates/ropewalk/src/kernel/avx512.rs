@@ -7,6 +7,7 @@ use super::beam::{Eight, EightDoubles};
 use super::level::{Found, Nearest, Range, Root, Simd};
 use super::list::{List, Lists};
 use super::look::look;
+use super::near::near;
 use super::order::{order, room};
 use super::slot::{Loaded, Slot};
 use super::x86::{self, Children, Lanes};
@@ -72,6 +73,12 @@ impl Simd for Avx512 {
     unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32 {
         // SAFETY: passed on to the caller.
         unsafe { look::<Eight, ROUNDED, WHOLE>(slot, block) }
+    }
+
+    #[inline(always)]
+    unsafe fn near(slot: &Slot, ray: &Ray, block: &Block) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe { near::<Eight>(slot, ray, block) }
     }
 
     #[inline(always)]

@@ -44,18 +44,53 @@ impl Leaves<'_> {
         // SAFETY: passed on to the caller.
         unsafe {
             let block = self.block(line);
-            let lanes = match (Q::ROUNDED, Q::MANY) {
+            if SHAPES && block.holds_shapes() {
+                return self.near::<L>(slot, block);
+            }
+            match (Q::ROUNDED, Q::MANY) {
                 (false, false) => L::meets::<false, true>(slot, block),
                 (false, true) => L::meets::<false, false>(slot, block),
                 (true, false) => L::meets::<true, true>(slot, block),
                 (true, true) => L::meets::<true, false>(slot, block),
-            };
-            if SHAPES { lanes | block.shape_lanes() << WIDTH } else { lanes }
+            }
+        }
+    }
+
+    /// The lanes of a block of other primitives than triangles that the ray of a slot may hit, in bits 15..8.
+    ///
+    /// # Safety
+    /// As for [`Leaves::meet`].
+    #[inline(always)]
+    unsafe fn near<L: Simd>(&self, slot: &Slot, block: &Block) -> u32 {
+        let ray = &self.exact.rays[slot.ray as usize];
+        // SAFETY: passed on to the caller.
+        unsafe { L::near(slot, ray, block) << WIDTH }
+    }
+
+    /// Tests a block all of whose lanes are asked about; see [`Leaves::test`].
+    ///
+    /// # Safety
+    /// As for [`Leaves::meet`].
+    #[inline(always)]
+    pub unsafe fn test_all<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
+        &self,
+        (k, slot): (u32, &mut Slot),
+        line: usize,
+        query: &mut Q,
+        events: &mut E,
+    ) -> (u32, bool) {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            let block = self.block(line);
+            if SHAPES && block.holds_shapes() {
+                return (self.near::<L>(slot, block), false);
+            }
+            self.test::<L, Q, E, SHAPES>((k, slot), line, 0, query, events)
         }
     }
 
     /// Tests a block that the ray of slot `k` meets in `lanes`; the lanes that need a decision in `f64`,
-    /// and whether any triangle is hit or may be.
+    /// and whether any triangle is hit or may be. Other primitives are all left to be decided.
     ///
     /// No branches: which blocks hold a hit cannot be predicted, and a wrong guess would cost more
     /// than a test.
@@ -63,7 +98,7 @@ impl Leaves<'_> {
     /// # Safety
     /// As for [`Leaves::meet`].
     #[inline(always)]
-    pub unsafe fn test<L: Simd, Q: BatchQuery, E: Events>(
+    pub unsafe fn test<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
         &self,
         (k, slot): (u32, &mut Slot),
         line: usize,
@@ -71,6 +106,9 @@ impl Leaves<'_> {
         query: &mut Q,
         events: &mut E,
     ) -> (u32, bool) {
+        if SHAPES && lanes >> WIDTH != 0 {
+            return (lanes, false);
+        }
         // SAFETY: passed on to the caller.
         unsafe {
             let block = self.block(line);
@@ -85,7 +123,7 @@ impl Leaves<'_> {
             let hits = Clear { lanes: lanes_of, range: &range, block, line };
             let unclear = query.take_clear::<L>(k as usize, slot, &hits, &self.exact);
             let open = if Q::CANDIDATES { 0 } else { open };
-            (open | unclear | lanes >> WIDTH << WIDTH, clear | open != 0)
+            (open | unclear, clear | open != 0)
         }
     }
 
@@ -99,8 +137,7 @@ impl Leaves<'_> {
         query: &mut Q,
     ) {
         if lanes >> WIDTH != 0 {
-            self.test_shapes((k, &mut *slot), line, query);
-            lanes &= (1 << WIDTH) - 1;
+            return self.test_shapes((k, slot), line, lanes >> WIDTH, query);
         }
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
@@ -109,12 +146,17 @@ impl Leaves<'_> {
         }
     }
 
-    /// Tests the primitives of a block that are no triangles.
-    fn test_shapes<Q: BatchQuery>(&self, (k, slot): (u32, &mut Slot), line: usize, query: &mut Q) {
+    /// Tests the primitives in some lanes of a block that are no triangles.
+    fn test_shapes<Q: BatchQuery>(
+        &self,
+        (k, slot): (u32, &mut Slot),
+        line: usize,
+        mut lanes: u32,
+        query: &mut Q,
+    ) {
         let block = self.tree.lines().block(line);
         // `load` has refused what cannot be prepared.
         let Some(ray) = PreparedRay::new(&self.exact.rays[slot.ray as usize]) else { return };
-        let mut lanes = block.shape_lanes();
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize & (WIDTH - 1);
             lanes &= lanes - 1;

@@ -207,6 +207,13 @@ pub trait Simd: Locate {
     /// See the trait.
     unsafe fn test<const ROUNDED: bool>(slot: &Slot, block: &Block, range: &mut Range) -> Found;
 
+    /// The lanes of a block of other primitives that the ray may hit, and perhaps a few more; see
+    /// [`near`](super::near::near).
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn near(slot: &Slot, ray: &Ray, block: &Block) -> u32;
+
     /// The clear lane with the smallest upper bound, that bound, and the other clear lanes whose
     /// lower bound does not lie above it. Lane 0 and infinity without clear lanes.
     ///

@@ -27,6 +27,7 @@ mod level;
 mod list;
 mod look;
 mod memory;
+mod near;
 mod order;
 mod particles;
 pub(crate) mod point;

@@ -2,10 +2,12 @@
 
 #![allow(unsafe_code)]
 
+use super::beam::PortableLanes;
 use super::entry::{Corners, Locate, REACH, Segment, path};
 use super::level::{
     DEPTH_SLACK, Found, Nearest, ROUNDED_DEPTH, ROUNDED_SIZE, Range, Root, Simd, WEIGHT_SLACK,
 };
+use super::near::near;
 use super::slot::{Loaded, Slot, TINY, later};
 use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
@@ -60,6 +62,12 @@ impl Simd for Scalar {
         // SAFETY: portable code.
         let found = unsafe { Self::test::<ROUNDED>(slot, block, &mut Range::default()) };
         found.clear | found.open
+    }
+
+    #[inline(always)]
+    unsafe fn near(slot: &Slot, ray: &Ray, block: &Block) -> u32 {
+        // SAFETY: portable code.
+        unsafe { near::<PortableLanes<WIDTH>>(slot, ray, block) }
     }
 
     #[inline(always)]

@@ -78,7 +78,7 @@ pub unsafe fn single<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
                 let lanes = leaves.meet::<L, Q, SHAPES>(slot, line);
                 if lanes != 0 {
                     let (open, _) =
-                        leaves.test::<L, Q, E>((0, &mut *slot), line, lanes, query, events);
+                        leaves.test::<L, Q, E, SHAPES>((0, &mut *slot), line, lanes, query, events);
                     if open != 0 {
                         leaves.decide((0, &mut *slot), line, open, query);
                     }

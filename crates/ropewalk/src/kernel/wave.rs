@@ -26,7 +26,7 @@ use super::query::BatchQuery;
 use super::slot::{Loaded, Slot};
 use super::source::Source;
 use crate::geometry::Geometry;
-use crate::wide::{BLOCK_LINES, LINE, WIDTH, WideTree, code_line, code_offset};
+use crate::wide::{BLOCK_LINES, LINE, WideTree, code_line, code_offset};
 
 /// Rays in flight on a core.
 pub const WAVE: usize = 24;
@@ -256,11 +256,9 @@ impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
                 let lanes = unsafe {
                     let (slot, line) = (&mut *slots.add(k as usize), line as usize);
                     if many {
-                        let shapes =
-                            if SHAPES { self.tree.lines().block(line).shape_lanes() } else { 0 };
-                        let (slot, lanes) = ((k, slot), shapes << WIDTH);
+                        let slot = (k, slot);
                         let (open, struck) =
-                            leaves.test::<L, Q, E>(slot, line, lanes, self.query, self.events);
+                            leaves.test_all::<L, Q, E, SHAPES>(slot, line, self.query, self.events);
                         self.struck += u64::from(struck);
                         open
                     } else {
@@ -288,7 +286,8 @@ impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
                 // SAFETY: as above.
                 let (lanes, struck) = unsafe {
                     let slot = (k, &mut *slots.add(k as usize));
-                    leaves.test::<L, Q, E>(slot, line as usize, lanes, self.query, self.events)
+                    let line = line as usize;
+                    leaves.test::<L, Q, E, SHAPES>(slot, line, lanes, self.query, self.events)
                 };
                 if Q::MANY {
                     self.struck += u64::from(struck);

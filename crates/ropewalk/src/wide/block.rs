@@ -11,8 +11,11 @@ pub const WIDTH: usize = 8;
 /// bytes   0..288  vertex[i][axis][lane]   coordinates of the triangles' vertices
 /// bytes 288..320  id[lane]                bits 29..0 primitive, bits 31..30 sides (see SIDES_*)
 /// ```
-/// A lane that holds no primitive has NaN vertices and [`NO_ID`]; a lane that holds a primitive of
-/// another kind has NaN vertices and that primitive's id. NaN vertices never test as hit.
+/// A lane that holds no primitive has NaN vertices and [`NO_ID`]; a triangle that is never hit has NaN vertices and
+/// its id. NaN vertices never test as hit.
+///
+/// Primitives of other kinds lie in blocks of their own, from lane 0 on: each has NaN for the first vertex's x, and
+/// in the other eight places, in their order, its [`Bound`](super::Bound): centre, radius, axis, thickness.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Block {
@@ -51,8 +54,9 @@ impl Block {
 
     /// The lanes that hold primitives other than triangles.
     pub fn shape_lanes(&self) -> u32 {
-        let holds =
-            |lane: usize| self.id[lane] & ID_MASK != NO_ID && self.vertex[0][0][lane].is_nan();
-        (0..WIDTH).map(|lane| u32::from(holds(lane)) << lane).sum()
+        if !self.holds_shapes() {
+            return 0;
+        }
+        (0..WIDTH).map(|lane| u32::from(self.id[lane] & ID_MASK != NO_ID) << lane).sum()
     }
 }

@@ -2,8 +2,8 @@
 
 use super::lines::{BLOCK_LINES, LINE, Lines};
 use super::{
-    Block, COUNT_OVERFLOW, CompileError, LEVELS, MAX_LINES, SIDES_BACK, SIDES_BOTH, SIDES_FRONT,
-    Treelet, WIDTH, WideTree, leaf_code, treelet_code,
+    Block, Bound, COUNT_OVERFLOW, CompileError, LEVELS, MAX_LINES, SIDES_BACK, SIDES_BOTH,
+    SIDES_FRONT, Treelet, WIDTH, WideTree, leaf_code, treelet_code,
 };
 use crate::build::{self, BuildError, BuildReport, BuildSettings, Monitor};
 use crate::geometry::Geometry;
@@ -45,7 +45,7 @@ impl WideTree {
         build::in_pool(settings.threads, || {
             let (tree, mut report) = build::build_here(geometry, &settings, monitor)?;
             if let Some(limit) = settings.memory_limit {
-                let (treelets, blocks) = count(&tree);
+                let (treelets, blocks) = count(&tree, geometry);
                 // The binary tree is still there while the wide one is filled from runs of 12 bytes.
                 let wide = (1 + treelets + blocks * BLOCK_LINES) * LINE;
                 let needed = (wide + report.tree.bytes + blocks * size_of::<Run>()) as u64;
@@ -62,6 +62,8 @@ impl WideTree {
 
     /// Compiles `tree`, which was built over `geometry`.
     ///
+    /// In a leaf triangles come before all others, which begin a block of their own.
+    ///
     /// Laid out depth first: behind a treelet come the blocks of its leaves, then the subtrees of
     /// its other children, so that a subtree is contiguous and a leaf close to its treelet.
     ///
@@ -77,7 +79,7 @@ impl WideTree {
         parallel: bool,
         is_left_out: LeftOut<'_>,
     ) -> Result<WideTree, CompileError> {
-        let (treelets, blocks) = count(tree);
+        let (treelets, blocks) = count(tree, geometry);
         // Line 0 is a dummy, so that the code 0 means an empty cell everywhere.
         let needed = 1 + treelets + blocks * BLOCK_LINES;
         if needed > MAX_LINES {
@@ -89,18 +91,24 @@ impl WideTree {
         })?;
         let mut compiler = Compiler {
             tree,
+            geometry,
             lines,
             next: 1,
             runs: Vec::with_capacity(blocks),
             overflow: Vec::new(),
+            sorted: Vec::new(),
         };
         let root = match tree.kind(BspTree::ROOT) {
             NodeKind::Leaf { first, count } => compiler.leaf(first, count),
             NodeKind::Inner { .. } => compiler.subtree(BspTree::ROOT),
         };
-        let Compiler { mut lines, next, runs, overflow, .. } = compiler;
+        let Compiler { mut lines, next, runs, overflow, sorted, .. } = compiler;
         debug_assert_eq!(next as usize, needed);
-        let has_shapes = fill(&mut lines, &runs, (tree, geometry, is_left_out), parallel);
+        let refs = |run: &Run| match geometry.has_shapes() {
+            true => &sorted[run.first_ref as usize..][..run.count as usize],
+            false => tree.leaf_refs(run.first_ref, run.count),
+        };
+        let has_shapes = fill(&mut lines, &runs, (&refs, geometry, is_left_out), parallel);
         Ok(WideTree {
             bounds: tree.bounds(),
             root,
@@ -114,13 +122,34 @@ impl WideTree {
     }
 }
 
+/// How many of some primitives are triangles, and how many are others.
+fn kinds(geometry: &Geometry, prims: &[u32]) -> [usize; 2] {
+    if !geometry.has_shapes() {
+        return [prims.len(), 0];
+    }
+    let triangles = prims.iter().filter(|&&prim| geometry.triangle(prim).is_some()).count();
+    [triangles, prims.len() - triangles]
+}
+
+/// The primitives of a leaf in the order in which its blocks hold them, and the numbers of both kinds.
+pub(super) fn ordered(geometry: &Geometry, prims: &[u32]) -> (Vec<u32>, [usize; 2]) {
+    let (mut triangles, others): (Vec<u32>, Vec<u32>) =
+        prims.iter().partition(|&&prim| geometry.triangle(prim).is_some());
+    let counts = [triangles.len(), others.len()];
+    triangles.extend(others);
+    (triangles, counts)
+}
+
 /// Treelets and blocks that a tree needs.
-fn count(tree: &BspTree) -> (usize, usize) {
+fn count(tree: &BspTree, geometry: &Geometry) -> (usize, usize) {
     let (mut treelets, mut blocks) = (0, 0);
     let mut stack = vec![(BspTree::ROOT, 0)];
     while let Some((node, level)) = stack.pop() {
         match tree.kind(node) {
-            NodeKind::Leaf { count, .. } => blocks += (count as usize).div_ceil(WIDTH),
+            NodeKind::Leaf { first, count } => {
+                let counts = kinds(geometry, tree.leaf_refs(first, count));
+                blocks += counts.map(|count| count.div_ceil(WIDTH)).iter().sum::<usize>();
+            }
             NodeKind::Inner { left, right, .. } => {
                 treelets += usize::from(level == 0);
                 let below = (level + 1) % LEVELS;
@@ -133,18 +162,21 @@ fn count(tree: &BspTree) -> (usize, usize) {
 
 struct Compiler<'a> {
     tree: &'a BspTree,
+    geometry: &'a Geometry,
     lines: Lines,
     /// The first line not taken.
     next: u32,
     /// What goes into each block; they are filled last, since that is most of the work.
     runs: Vec<Run>,
     overflow: Vec<(u32, u32)>,
+    /// The references of all leaves in the order of blocks, where there are others than triangles.
+    sorted: Vec<u32>,
 }
 
 /// Says of a triangle and its number whether it is never hit.
 pub(crate) type LeftOut<'a> = &'a (dyn Fn(u32, &Triangle) -> bool + Sync);
 
-/// The references that go into a block.
+/// The references that go into a block, by their places in the tree or in [`Compiler::sorted`].
 #[derive(Clone, Copy)]
 struct Run {
     /// Line of the block.
@@ -153,21 +185,23 @@ struct Run {
     count: u32,
 }
 
+/// The references of a run.
+type RefsOf<'f, 'a> = &'f (dyn Fn(&Run) -> &'a [u32] + Sync);
+
 /// Blocks that are worth a task of their own.
 const MIN_RUNS: usize = 1024;
 
 /// Fills all blocks; true if any holds something else than triangles.
-fn fill(
+fn fill<'a>(
     lines: &mut Lines,
     runs: &[Run],
-    (tree, geometry, is_left_out): (&BspTree, &Geometry, LeftOut<'_>),
+    (refs, geometry, is_left_out): (RefsOf<'_, 'a>, &Geometry, LeftOut<'_>),
     parallel: bool,
 ) -> bool {
     let has_shapes = AtomicBool::new(false);
     let write = |(runs, first, bytes): (&[Run], u32, &mut [u8])| {
         for run in runs {
-            let prims = tree.leaf_refs(run.first_ref, run.count);
-            let block = block(geometry, is_left_out, prims, &has_shapes);
+            let block = block(geometry, is_left_out, refs(run), &has_shapes);
             let at = (run.line - first) as usize * LINE;
             bytes[at..][..size_of::<Block>()].copy_from_slice(bytemuck::bytes_of(&block));
         }
@@ -214,7 +248,10 @@ fn block(
                     }
                 }
             }
-            _ => has_shapes.store(true, Ordering::Relaxed),
+            shape => {
+                block.set_bound(lane, &Bound::of(shape));
+                has_shapes.store(true, Ordering::Relaxed);
+            }
         }
     }
     block
@@ -272,19 +309,31 @@ impl Compiler<'_> {
         }
     }
 
-    /// Hands out the blocks of a leaf, its primitives in ascending order; its code.
+    /// Hands out the blocks of a leaf, its triangles and then its other primitives in ascending order; its code.
     fn leaf(&mut self, first_ref: u32, refs: u32) -> u32 {
         if refs == 0 {
             return 0;
         }
+        let (mut at, mut counts) = (first_ref, [refs, 0]);
+        if self.geometry.has_shapes() {
+            at = self.sorted.len() as u32;
+            let (sorted, kinds) = ordered(self.geometry, self.tree.leaf_refs(first_ref, refs));
+            counts = kinds.map(|count| count as u32);
+            self.sorted.extend(sorted);
+        }
         let width = WIDTH as u32;
-        let blocks = refs.div_ceil(width);
+        let blocks = counts[0].div_ceil(width) + counts[1].div_ceil(width);
         let first = self.take(blocks as usize * BLOCK_LINES);
-        self.runs.extend((0..blocks).map(|i| Run {
-            line: first + i * BLOCK_LINES as u32,
-            first_ref: first_ref + i * width,
-            count: width.min(refs - i * width),
-        }));
+        let mut line = first;
+        for refs in counts {
+            self.runs.extend((0..refs.div_ceil(width)).map(|i| Run {
+                line: line + i * BLOCK_LINES as u32,
+                first_ref: at + i * width,
+                count: width.min(refs - i * width),
+            }));
+            line += refs.div_ceil(width) * BLOCK_LINES as u32;
+            at += refs;
+        }
         if blocks >= COUNT_OVERFLOW {
             self.overflow.push((first, blocks));
         }

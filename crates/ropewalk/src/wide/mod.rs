@@ -5,6 +5,7 @@
 //! a wide tree holds the same cells, and `validate` checks it against the tree it came from.
 
 mod block;
+mod bound;
 mod compile;
 mod lines;
 mod treelet;
@@ -12,6 +13,7 @@ mod up;
 mod validate;
 
 pub use block::{Block, ID_MASK, NO_ID, SIDES_BACK, SIDES_BOTH, SIDES_FRONT, WIDTH};
+pub use bound::Bound;
 pub use lines::{BLOCK_LINES, LINE, Lines};
 pub use treelet::{
     AXIS_SHIFTS, COUNT_BITS, COUNT_OVERFLOW, Flips, LEAF, LEVELS, MAX_LINES, ORDER, OrderTable,

@@ -1,8 +1,10 @@
 //! Does a wide tree hold the cells of its binary tree?
 
+use super::compile::ordered;
 use super::{
-    BLOCK_LINES, COUNT_OVERFLOW, ID_MASK, LEAF, LEVELS, NO_ID, WIDTH, WideTree, code_line,
+    BLOCK_LINES, Bound, COUNT_OVERFLOW, ID_MASK, LEAF, LEVELS, NO_ID, WIDTH, WideTree, code_line,
 };
+use crate::geometry::Geometry;
 use crate::tree::{BspTree, NodeKind};
 
 /// The first thing found wrong with a wide tree.
@@ -25,7 +27,7 @@ pub enum WideFault {
         /// The binary node that it should stand for.
         node: u32,
     },
-    /// The primitives of a leaf are not those of the binary tree.
+    /// The primitives of a leaf are not those of the binary tree, triangles first, with the bounds of the others.
     #[error("the blocks of code {code:#x} do not hold the primitives of leaf {node}")]
     Leaf {
         /// The leaf code.
@@ -36,15 +38,16 @@ pub enum WideFault {
 }
 
 impl WideTree {
-    /// Checks every treelet and leaf against the binary tree that it was compiled from.
+    /// Checks every treelet and leaf against the binary tree that it was compiled from, which was built over
+    /// `geometry`.
     ///
     /// # Errors
     /// The first [`WideFault`].
-    pub fn validate(&self, tree: &BspTree) -> Result<(), WideFault> {
+    pub fn validate(&self, tree: &BspTree, geometry: &Geometry) -> Result<(), WideFault> {
         let mut stack = vec![(self.root, BspTree::ROOT, 0, 0)];
         while let Some((code, node, parent, child)) = stack.pop() {
             if code & LEAF != 0 || code == 0 {
-                self.check_leaf(tree, code, node, parent, child)?;
+                self.check_leaf((tree, geometry), code, node, parent, child)?;
                 continue;
             }
             let line = code_line(code);
@@ -79,7 +82,7 @@ impl WideTree {
 
     fn check_leaf(
         &self,
-        tree: &BspTree,
+        (tree, geometry): (&BspTree, &Geometry),
         code: u32,
         node: u32,
         treelet: u32,
@@ -95,9 +98,25 @@ impl WideTree {
         if lines.iter().any(|&line| line == 0 || line + BLOCK_LINES > self.lines.len()) {
             return Err(WideFault::Range { treelet, child });
         }
-        let ids = lines.iter().flat_map(|&line| self.lines.block(line).id).map(|id| id & ID_MASK);
-        let held: Vec<u32> = ids.filter(|&id| id != NO_ID).collect();
-        let full = lines.len() == expected.len().div_ceil(WIDTH);
-        if held == expected && full { Ok(()) } else { Err(fault) }
+        let (ordered, counts) = ordered(geometry, expected);
+        let blocks = counts.map(|count| count.div_ceil(WIDTH));
+        let mut places = Vec::new();
+        for (i, &line) in lines.iter().enumerate() {
+            let block = self.lines.block(line);
+            let is_of_shapes = i >= blocks[0];
+            if block.holds_shapes() != is_of_shapes {
+                return Err(fault);
+            }
+            for lane in (0..WIDTH).filter(|&lane| block.id[lane] & ID_MASK != NO_ID) {
+                let id = block.id[lane] & ID_MASK;
+                let bound = is_of_shapes.then(|| Bound::of(geometry.shape(id)));
+                if block.bound(lane) != bound {
+                    return Err(fault);
+                }
+                places.push(id);
+            }
+        }
+        let full = lines.len() == blocks.iter().sum::<usize>();
+        if places == ordered && full { Ok(()) } else { Err(fault) }
     }
 }

@@ -9,5 +9,6 @@ mod exact;
 mod parts;
 mod ropes;
 mod scenes;
+mod shapes;
 mod walker;
 mod wave;

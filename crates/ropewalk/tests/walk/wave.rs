@@ -24,7 +24,7 @@ fn every_hit(geometry: &Geometry, ray: &Ray) -> Vec<(f32, u32)> {
 
 pub fn check(geometry: &Geometry, tree: &BspTree, rays: &[Ray]) {
     let wide = WideTree::compile(tree, geometry).unwrap();
-    assert_eq!(wide.validate(tree), Ok(()));
+    assert_eq!(wide.validate(tree, geometry), Ok(()));
     let oracle = BruteForce { geometry };
     let closest: Vec<_> = rays.iter().map(|r| oracle.closest_hit(r, &mut NoCounts)).collect();
     let every: Vec<_> = rays.iter().map(|r| every_hit(geometry, r)).collect();

@@ -27,7 +27,6 @@ mod vector;
 mod x86;
 
 pub use shaft::BeamSimd;
-#[cfg(test)]
 pub use vector::Lanes as PortableLanes;
 pub use vector::{Doubles, Vector};
 #[cfg(target_arch = "x86_64")]
