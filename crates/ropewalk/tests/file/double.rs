@@ -5,8 +5,8 @@ use crate::scenes::Ready;
 use ropewalk::build::{BuildReport, BuildSettings, Preset};
 use ropewalk::double::{DoubleCaster, DoubleGeometry, DoubleTree};
 use ropewalk::file::{
-    AnyOpened, Check, Contents, Figures, FileError, HEADER_BYTES, OpenedDouble, Section, Tag,
-    mesh_hash, open, open_any, write,
+    AnyOpened, Check, Contents, Figures, FileError, HEADER_BYTES, OpenedDouble,
+    SHAPES_LAYOUT_VERSION, Section, Tag, mesh_hash, open, open_any, write,
 };
 use ropewalk::kernel::Level;
 use ropewalk::point::PointQueries;
@@ -146,6 +146,12 @@ fn what_is_missing_or_cannot_be_is_said() {
         let mut bytes = bytes.clone();
         let len = if at == 148 { 4 } else { 8 };
         bytes[at..at + len].copy_from_slice(&number.to_le_bytes()[..len]);
+        if at == 148 {
+            // Other primitives than triangles are of another layout.
+            repair(&mut bytes);
+            assert!(refusal(&bytes).contains("tree layout version 1"));
+            bytes[16] = SHAPES_LAYOUT_VERSION as u8;
+        }
         repair(&mut bytes);
         let said = refusal(&bytes);
         assert!(said.contains(words), "{said}");
