@@ -687,11 +687,11 @@ impl DoubleCore {
                 value.copy_from_slice(&part.coordinates([hit.u, hit.v]));
             }
             Surface::Normal => {
-                let n = object.geometry.normal(prim);
+                let Some(n) = object.geometry.normal(prim) else { return false };
                 value.copy_from_slice(&transform.map_or(n, |transform| transform.normal(n)));
             }
             Surface::Position => {
-                let [a, b, c] = object.geometry.triangle(prim);
+                let Some([a, b, c]) = object.geometry.triangle(prim) else { return false };
                 let p =
                     std::array::from_fn(|i| a[i] + hit.u * (b[i] - a[i]) + hit.v * (c[i] - a[i]));
                 value.copy_from_slice(&transform.map_or(p, |transform| transform.point(p)));

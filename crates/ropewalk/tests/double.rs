@@ -80,7 +80,7 @@ fn rays(
     let oracle = DoubleBruteForce { geometry };
     let mut rays = Vec::new();
     for i in 0..500 {
-        let triangle = geometry.triangle(draw.below(geometry.len()) as u32);
+        let triangle = geometry.triangle(draw.below(geometry.len()) as u32).unwrap();
         let inside = uniform(draw);
         let mut origin: [f64; 3] = std::array::from_fn(|a| offset[a] + scale * 1.5 * inside[a]);
         let mut dir = uniform(draw);
@@ -227,7 +227,7 @@ fn no_ray_leaves_a_closed_surface() {
         let (geometry, tree) = build(mesh, Preset::Balanced);
         let rays: Vec<DoubleRay> = (0..20_000)
             .map(|i| {
-                let triangle = geometry.triangle(draw.below(geometry.len()) as u32);
+                let triangle = geometry.triangle(draw.below(geometry.len()) as u32).unwrap();
                 let w = if i % 2 == 0 { 0.0 } else { draw.uniform(0.0, 1.0) };
                 let jitter = uniform(&mut draw);
                 let origin: [f64; 3] = std::array::from_fn(|a| offset[a] + scale * 0.3 * jitter[a]);
@@ -321,4 +321,20 @@ fn degenerate_triangles_are_judged_in_double_precision() {
     let ray = DoubleRay::new([0.5, thin / 2.0, 1.0], [0.0, 0.0, -1.0]);
     let hits = DoubleCaster::new(&tree, &geometry).closest_hit(&[ray]);
     assert_eq!((hits.t[0], hits.prim_id[0]), (1.0, 1));
+}
+
+#[test]
+fn triangles_by_number() {
+    let (geometry, _) = build(grid(&mut Draw::new(130), 20, 3), Preset::Fast);
+    let count = geometry.len() as u32;
+    for id in 0..count {
+        let corners = geometry.faces()[id as usize].map(|i| geometry.vertices()[i as usize]);
+        assert_eq!(geometry.triangle(id), Some(corners));
+        let length = geometry.normal(id).unwrap().iter().map(|x| x * x).sum::<f64>();
+        let flat = geometry.degenerate().contains(&id);
+        assert!(if flat { length.is_nan() } else { (length - 1.0).abs() < 1e-12 }, "{id}");
+    }
+    for id in [count, count + 1, 1 << 30, u32::MAX] {
+        assert_eq!((geometry.triangle(id), geometry.normal(id)), (None, None));
+    }
 }

@@ -56,7 +56,8 @@ fn rays(draw: &mut Draw, scene: &InstancedScene, scale: f64, offset: f64) -> Vec
         let mut origin = from.map(|x| offset + 6.0 * scale * x);
         let placed = &scene.instances()[draw.below(scene.instances().len())];
         let face = draw.below(placed.object.geometry.len()) as u32;
-        let corners = placed.object.geometry.triangle(face).map(|p| placed.transform.point(p));
+        let corners =
+            placed.object.geometry.triangle(face).unwrap().map(|p| placed.transform.point(p));
         match i % 5 {
             0 => dir = std::array::from_fn(|a| corners[0][a] - origin[a]),
             1 => {

@@ -180,25 +180,23 @@ impl DoubleGeometry {
             + size_of_val(&self.degenerate[..])
     }
 
-    /// The vertices of a triangle.
-    ///
-    /// # Panics
-    /// If `prim_id` is out of range.
-    pub fn triangle(&self, prim_id: u32) -> [[f64; 3]; 3] {
-        self.faces[prim_id as usize].map(|i| self.vertices[i as usize])
+    /// The vertices of a triangle; `None` if there is none of this number, as where an altered file names it or
+    /// its vertices.
+    #[inline(always)]
+    pub fn triangle(&self, prim_id: u32) -> Option<[[f64; 3]; 3]> {
+        let &[a, b, c] = self.faces.get(prim_id as usize)?;
+        let vertex = |i: u32| self.vertices.get(i as usize).copied();
+        Some([vertex(a)?, vertex(b)?, vertex(c)?])
     }
 
     /// The unit normal of a triangle, towards the side from which its vertices run counter-clockwise; NaN
-    /// for a degenerate one.
-    ///
-    /// # Panics
-    /// If `prim_id` is out of range.
-    pub fn normal(&self, prim_id: u32) -> [f64; 3] {
-        let (_, n) = edges_and_normal(self.triangle(prim_id));
+    /// for a degenerate one, `None` as for [`DoubleGeometry::triangle`].
+    pub fn normal(&self, prim_id: u32) -> Option<[f64; 3]> {
+        let (_, n) = edges_and_normal(self.triangle(prim_id)?);
         let largest = size(n);
         let n = n.map(|x| x / largest);
         let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-        n.map(|x| x / length)
+        Some(n.map(|x| x / length))
     }
 
     /// Tests one triangle: [`Triangle::meet`] on the coordinates as they were given. The hit, if its
@@ -213,7 +211,7 @@ impl DoubleGeometry {
             return None;
         }
         // An altered file may name what is not there.
-        let corners = self.vertices_of(prim_id)?;
+        let corners = self.triangle(prim_id)?;
         let corner = |i: usize, axis: usize| corners[i][axis];
         let frame = Shear::along(&ray.origin, &ray.dir);
         let met = Triangle::meet(corner, &frame, sides)?;
@@ -253,14 +251,6 @@ impl DoubleGeometry {
         &self.faces
     }
 
-    /// The vertices of a triangle, if it is there.
-    #[inline(always)]
-    pub(super) fn vertices_of(&self, prim_id: u32) -> Option<[[f64; 3]; 3]> {
-        let &[a, b, c] = self.faces.get(prim_id as usize)?;
-        let vertex = |i: u32| self.vertices.get(i as usize).copied();
-        Some([vertex(a)?, vertex(b)?, vertex(c)?])
-    }
-
     #[inline(always)]
     pub(super) fn frame(&self) -> &Frame {
         &self.frame
@@ -277,7 +267,7 @@ impl DoubleGeometry {
 
     /// True if the vertices lie on one line exactly.
     fn has_no_area(&self, face: u32) -> bool {
-        let p = self.triangle(face);
+        let Some(p) = self.triangle(face) else { return true };
         let ((e, f), n) = edges_and_normal(p);
         size(n) <= NORMAL_FILTER * size(e) * size(f)
             && [(1, 2), (2, 0), (0, 1)].into_iter().all(|(i, j)| is_flat(p, i, j))

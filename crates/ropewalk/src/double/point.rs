@@ -12,7 +12,7 @@ impl DoubleGeometry {
     /// A vertex by its scaled coordinates.
     #[inline(always)]
     fn scaled_vertices(&self, prim_id: u32) -> Option<[[f64; 3]; 3]> {
-        let [a, b, c] = self.vertices_of(prim_id)?;
+        let [a, b, c] = self.triangle(prim_id)?;
         Some([self.scaled(a), self.scaled(b), self.scaled(c)])
     }
 }
@@ -58,7 +58,7 @@ impl Triangles for DoubleGeometry {
     }
 
     fn placed_corners(&self, prim_id: u32) -> Option<[[f64; 3]; 3]> {
-        Some(self.vertices_of(prim_id)?.map(|p| self.frame().scaled(p)))
+        Some(self.triangle(prim_id)?.map(|p| self.frame().scaled(p)))
     }
 
     fn has_area(&self, prim_id: u32) -> bool {

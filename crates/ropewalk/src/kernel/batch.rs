@@ -22,6 +22,7 @@ use crate::point::cells::locate;
 use crate::ray::{Hit, PreparedRay, Ray};
 use crate::wide::WideTree;
 use rayon::prelude::*;
+use std::cell::Cell as Kept;
 
 /// Rays that one task of a parallel batch traces.
 pub(super) const TASK: usize = 4096;
@@ -560,11 +561,7 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         query: &mut Q,
         lanes: &mut Lanes<C>,
     ) {
-        // Particles may cast rays themselves while they are asked, so the slots are taken along.
-        let mut slots = with_room(|room| std::mem::take(&mut room.slots));
-        slots.resize_with(WAVE, Slot::new);
-        self.run_source(&mut slots[..width], query, lanes, &mut NoEvents);
-        with_room(|room| room.slots = slots);
+        with_room(|room| self.run_source(&mut room.slots[..width], query, lanes, &mut NoEvents));
     }
 
     /// The tree.
@@ -700,12 +697,14 @@ impl<F: HitFilter> Walk for Moved<'_, '_, F> {
     }
 }
 
+/// Works in the room of the calling thread, or in another one where that is taken: filters and particles may
+/// put batches themselves.
 fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
     thread_local! {
-        static ROOM: std::cell::RefCell<Option<Room>> = const { std::cell::RefCell::new(None) };
+        static ROOM: Kept<Option<Box<Room>>> = const { Kept::new(None) };
     }
-    ROOM.with_borrow_mut(|room| {
-        work(room.get_or_insert_with(|| Room {
+    let mut room = ROOM.take().unwrap_or_else(|| {
+        Box::new(Room {
             slots: (0..WAVE).map(|_| Slot::new()).collect(),
             beam: Box::new(beam::Room::new()),
             order: Vec::new(),
@@ -713,8 +712,11 @@ fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
             sorter: Sorter::default(),
             answers: Answers::default(),
             all: Vec::new(),
-        }))
-    })
+        })
+    });
+    let answer = work(&mut room);
+    ROOM.set(Some(room));
+    answer
 }
 
 macro_rules! instantiate {

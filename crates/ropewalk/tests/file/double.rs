@@ -70,7 +70,8 @@ fn answers(tree: &DoubleTree, geometry: &DoubleGeometry, scene: &OpenedDouble) -
     });
     let queries = PointQueries::new(tree, geometry).unwrap();
     let found = format!("{:?} {:?}", queries.closest_point(&points), queries.sides(&points));
-    let normals = (0..geometry.len() as u32).map(|id| format!("{:?}", geometry.normal(id)));
+    let normals =
+        (0..geometry.len() as u32).map(|id| format!("{:?}", geometry.normal(id).unwrap()));
     rays.chain([found]).chain(normals).collect()
 }
 

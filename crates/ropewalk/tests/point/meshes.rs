@@ -144,7 +144,7 @@ pub fn points_around(draw: &mut Draw, triangles: &Triangles, count: usize) -> Ve
 
 /// The triangles of a geometry in `f64`.
 pub fn triangles_of(geometry: &DoubleGeometry) -> Triangles {
-    (0..geometry.len() as u32).map(|id| geometry.triangle(id)).collect()
+    (0..geometry.len() as u32).filter_map(|id| geometry.triangle(id)).collect()
 }
 
 /// True if all triangles of a scene have an area.

@@ -138,12 +138,15 @@ pub fn row<T: Float>(events: &Events<T>, i: usize) -> Vec<(u32, T, u32, bool)> {
         .collect()
 }
 
+/// One type for all filters, so that the kernels are compiled for it once.
+pub type Filter<'a> = &'a (dyn Fn(usize, &Crossed) -> bool + Sync);
+
 /// Runs a crowd at every level and compares with the definition; the number of events.
-pub fn check<G: WalkerGeometry, F: Fn(usize, &Crossed) -> bool + Copy + Sync>(
+pub fn check<G: WalkerGeometry>(
     geometry: &G,
     tree: &G::Tree,
     crowd: &Crowd<G::Float>,
-    filter: F,
+    filter: Filter<'_>,
 ) -> usize {
     let mut met = 0;
     for encounter in [Encounter::Pass, Encounter::Stop] {
@@ -183,8 +186,8 @@ fn each(seed: u64, scene: impl Fn(&mut Draw) -> Geometry) {
         let bounds = geometry.bounds();
         let bounds = (bounds.min.map(f64::from), bounds.max.map(f64::from));
         let crowd = crowd(&mut draw, &geometry, bounds, &coordinates(&bench), 80);
-        met += check(&geometry, &wide, &crowd, |_, _| true);
-        filtered += check(&geometry, &wide, &crowd, |particle, hit| {
+        met += check(&geometry, &wide, &crowd, &|_, _| true);
+        filtered += check(&geometry, &wide, &crowd, &|particle, hit| {
             hit.entering == (particle % 2 == 0)
                 && !(hit.prim_id as usize + particle).is_multiple_of(3)
         });

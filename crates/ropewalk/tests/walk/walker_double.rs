@@ -64,8 +64,8 @@ fn everywhere(seed: u64, scene: impl Fn(&mut Draw) -> Triangles) {
         }
         let bounds = geometry.bounds().unwrap();
         let crowd = crowd(&mut draw, &geometry, bounds, &values, 80);
-        let met = check(&geometry, &tree, &crowd, |_, _| true);
-        let filtered = check(&geometry, &tree, &crowd, |particle, hit| {
+        let met = check(&geometry, &tree, &crowd, &|_, _| true);
+        let filtered = check(&geometry, &tree, &crowd, &|particle, hit| {
             hit.entering == (particle % 2 == 0)
                 && !(hit.prim_id as usize + particle).is_multiple_of(3)
         });
@@ -89,7 +89,7 @@ fn ends_at_vertices_and_beside_them() {
         let geometry = geometry_of(&grid(&mut draw, 80, 3), place);
         let tree = tree_of(&geometry, round);
         let point = |draw: &mut Draw| -> [f64; 3] {
-            let t = geometry.triangle(draw.below(geometry.len()) as u32);
+            let t = geometry.triangle(draw.below(geometry.len()) as u32).unwrap();
             let (i, w) = (draw.below(3), draw.uniform(0.0, 1.0));
             let (a, b) = (t[i], t[(i + 1) % 3]);
             let p: [f64; 3] = match draw.below(3) {
@@ -240,7 +240,7 @@ fn from_afar_and_without_an_end() {
         let tree = tree_of(&geometry, round);
         let mut walks: Vec<([f64; 3], [f64; 3])> = Vec::new();
         for i in 0..400 {
-            let t = geometry.triangle(draw.below(geometry.len()) as u32);
+            let t = geometry.triangle(draw.below(geometry.len()) as u32).unwrap();
             let on = |a: usize| t[0][a] + 0.25 * (t[1][a] - t[0][a]) + 0.25 * (t[2][a] - t[0][a]);
             let mut ray: [f64; 3] = std::array::from_fn(|_| draw.uniform(-1.0, 1.0));
             let size = [1.0, 3.0, 1e3, 1e7, 1e9, 1e30, 1e-15, 1e-200][i % 8] * scale;
