@@ -1,22 +1,25 @@
 //! A scene with its tree, and the batch queries.
 
 use crate::error::{self, Failure};
-use crate::faces::{Faces, MeshFaces, Rows, once};
+use crate::faces::{Faces, MeshFaces, once};
 use crate::figures::Build;
+use crate::meshes::{Given, Mesh, geometry_of};
+use crate::plan::{Plan, Watch, left_for_build, plan_of, sample};
 use crate::rays::{Invalid, Rays, View, one};
 use crate::surface::{self, Surface};
+use crate::tasks::{block, blocks, checked, split, total, zeros};
 use crate::walker::cell;
 use crate::{state, work};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use ropewalk::build::{BuildSettings, CostChoice, Monitor, Preset, RaySample};
+use ropewalk::build::{BuildSettings, CostChoice, Preset};
 use ropewalk::kernel::{AllHits, BatchCaster, HitFilter};
 use ropewalk::point::Cell;
-use ropewalk::primitive::{Cone, Primitive, Sphere, Triangle};
+use ropewalk::primitive::Primitive;
 use ropewalk::ray::PreparedRay;
 use ropewalk::wide::WideTree;
-use ropewalk::{Geometry, GeometryError, Hit, Ray, Shape, Sides};
+use ropewalk::{Geometry, Hit, Ray, Sides};
 use ropewalk_scene::{FacetPolicy, NffLimits, load_monitored};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -31,12 +34,6 @@ const LARGE_BLOCK: usize = 1 << 18;
 /// See [`LARGE_BLOCK`].
 const LARGE_TREE: usize = 32 << 20;
 
-/// The fewest rays of a task where several threads share a batch.
-const MIN_BLOCK: usize = 1024;
-
-/// Tasks a thread, so that none waits long for the slowest.
-const TASKS_PER_THREAD: usize = 4;
-
 /// A geometry of one or more meshes and the tree over it. It never changes.
 #[pyclass(frozen, module = "ropewalk._ropewalk")]
 pub struct Core {
@@ -49,42 +46,8 @@ pub struct Core {
     pub(crate) preset: Preset,
 }
 
-/// Watches a build for Python.
-pub struct Watch<'a> {
-    /// Set when the build is to stop.
-    pub stop: &'a AtomicBool,
-    /// The largest share done so far, as the bits of an `f64`, which are ordered as the numbers are.
-    pub done: &'a AtomicU64,
-}
-
-impl Monitor for Watch<'_> {
-    fn progress(&self, fraction: f64) {
-        self.done.fetch_max(fraction.max(0.0).to_bits(), Ordering::Relaxed);
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-}
-
 /// Parameters and primitives of a block.
 type TAndPrim<'a> = (&'a mut [f32], &'a mut [i32]);
-
-/// A mesh as Python gives it.
-#[derive(FromPyObject)]
-pub enum Given<'py> {
-    /// Vertices, and faces of three or four corners.
-    Mesh(PyReadonlyArray2<'py, f32>, PyReadonlyArray2<'py, u32>),
-    /// Rows of four numbers for spheres (centre, radius), of eight for cones (base, apex, their radii).
-    Shapes(PyReadonlyArray2<'py, f32>),
-}
-
-/// A mesh.
-enum Mesh<'a> {
-    Faces(&'a [[f32; 3]], Rows<'a>),
-    Spheres(&'a [[f32; 4]]),
-    Cones(&'a [[f32; 8]]),
-}
 
 /// A geometry and its faces.
 type Parts = (Geometry, Faces);
@@ -639,63 +602,6 @@ impl HitFilter for RayFilter<'_> {
     }
 }
 
-/// How to build.
-pub struct Plan {
-    /// The preset.
-    pub preset: Preset,
-    cost_model: CostChoice,
-    rays: RaySample,
-}
-
-impl Plan {
-    /// From the names of a preset and of a cost model.
-    pub fn new((preset, cost_model): &(String, String)) -> PyResult<Plan> {
-        let known = Preset::ALL.into_iter().find(|known| known.name() == preset);
-        let preset = known.ok_or_else(|| {
-            let names = Preset::ALL.map(Preset::name).join(", ");
-            let message = format!("preset is '{preset}'; expected one of {names}");
-            error::argument("preset", None, message)
-        })?;
-        let cost_model = CostChoice::by_name(cost_model).ok_or_else(|| {
-            let names = CostChoice::ALL.map(CostChoice::name).join(", ");
-            let message = format!("cost_model is '{cost_model}'; expected one of {names}");
-            error::argument("cost_model", None, message)
-        })?;
-        Ok(Plan { preset, cost_model, rays: RaySample::default() })
-    }
-
-    /// With a sample of rays.
-    pub fn with_rays(self, rays: RaySample) -> Plan {
-        Plan { rays, ..self }
-    }
-
-    /// The settings; work with 0 threads runs in the current pool, which is the one that `watch` chose.
-    pub fn settings(&self, threads: usize) -> BuildSettings {
-        self.cost_model.applied(BuildSettings {
-            threads: usize::from(threads == 1),
-            rays: self.rays.clone(),
-            ..BuildSettings::preset(self.preset)
-        })
-    }
-}
-
-/// The names of a preset and of a build's cost model, that of the presets where it is not known.
-pub fn plan_of(preset: Preset, report: &Build) -> (&'static str, &'static str) {
-    (preset.name(), report.cost_model.unwrap_or_default().name())
-}
-
-/// The sample that some rays are.
-fn sample(py: Python<'_>, rays: Option<&Rays>) -> PyResult<RaySample> {
-    let Some(rays) = rays else { return Ok(RaySample::default()) };
-    let arrays = rays.borrow(py)?;
-    let view = arrays.view()?;
-    Ok(py.detach(|| {
-        let mut rays = Vec::with_capacity(view.count);
-        view.interleave(0..view.count, &mut rays);
-        RaySample::new(&rays)
-    }))
-}
-
 /// Figures of a build, those of its bytes left to the caller.
 pub fn figures<'py>(
     py: Python<'py>,
@@ -737,135 +643,4 @@ pub fn masks_that_refuse<'a>(
     let common = meshes.iter().fold(!0, |all, mask| all & mask);
     let asked = if masks.len() == 1 { masks } else { &masks[range.clone()] };
     asked.iter().any(|mask| mask & common == 0).then_some(masks)
-}
-
-/// What a limit leaves for a build beyond the geometry itself.
-pub fn left_for_build(
-    limit: Option<u64>,
-    kept: u64,
-    primitives: usize,
-) -> Result<Option<u64>, Failure> {
-    let Some(limit) = limit else { return Ok(None) };
-    let geometry = kept + (primitives * (size_of::<Shape>() + size_of::<Sides>())) as u64;
-    let needed = geometry + ropewalk::build::estimated_bytes(primitives, 1.0);
-    if needed > limit { Err(Failure::Memory { needed, limit }) } else { Ok(Some(limit - geometry)) }
-}
-
-impl Given<'_> {
-    fn view(&self) -> PyResult<Mesh<'_>> {
-        let bad = || error::argument("meshes", None, "arrays of a wrong shape".into());
-        match self {
-            Given::Mesh(vertices, faces) => {
-                let width = faces.as_array().ncols();
-                let faces = Rows::new(faces.as_slice()?, width).ok_or_else(bad)?;
-                Ok(Mesh::Faces(vertices.as_slice()?.as_chunks::<3>().0, faces))
-            }
-            Given::Shapes(rows) => match rows.as_array().ncols() {
-                4 => Ok(Mesh::Spheres(rows.as_slice()?.as_chunks::<4>().0)),
-                8 => Ok(Mesh::Cones(rows.as_slice()?.as_chunks::<8>().0)),
-                _ => Err(bad()),
-            },
-        }
-    }
-}
-
-impl<'a> Mesh<'a> {
-    fn faces(&self) -> MeshFaces<'a> {
-        match *self {
-            Mesh::Faces(_, rows) => MeshFaces::Rows(rows),
-            Mesh::Spheres(rows) => MeshFaces::Single(rows.len()),
-            Mesh::Cones(rows) => MeshFaces::Single(rows.len()),
-        }
-    }
-}
-
-/// The primitives of some meshes.
-fn geometry_of(meshes: &[Mesh<'_>]) -> Result<Geometry, Failure> {
-    let mut geometry = Geometry::new();
-    for (mesh, given) in meshes.iter().enumerate() {
-        let refuse = |error| Failure::Mesh(mesh, error);
-        match *given {
-            Mesh::Faces(vertices, faces) => {
-                if let Some(vertex) = vertices.iter().position(|p| p.iter().any(|x| !x.is_finite()))
-                {
-                    return Err(refuse(GeometryError::Vertex { vertex, found: vertices[vertex] }));
-                }
-                match faces.triangles_alone() {
-                    Some(faces) if meshes.len() == 1 && !faces.is_empty() => {
-                        geometry = Geometry::from_triangles(vertices, faces).map_err(refuse)?;
-                    }
-                    _ => push_faces(&mut geometry, vertices, faces).map_err(refuse)?,
-                }
-            }
-            Mesh::Spheres(rows) => {
-                for &[x, y, z, radius] in rows {
-                    let sphere = Sphere { center: [x, y, z], radius };
-                    geometry.push(sphere, Sides::Both).map_err(refuse)?;
-                }
-            }
-            Mesh::Cones(rows) => {
-                for &[a, b, c, x, y, z, base_radius, apex_radius] in rows {
-                    let (base, apex) = ([a, b, c], [x, y, z]);
-                    let cone = Cone { base, apex, base_radius, apex_radius };
-                    geometry.push(cone, Sides::Both).map_err(refuse)?;
-                }
-            }
-        }
-    }
-    Ok(geometry)
-}
-
-/// Adds the triangles of some faces.
-fn push_faces(
-    geometry: &mut Geometry,
-    vertices: &[[f32; 3]],
-    faces: Rows<'_>,
-) -> Result<(), GeometryError> {
-    for (face, corners) in faces.triangles() {
-        if let Some(&found) = corners.iter().find(|&&i| i as usize >= vertices.len()) {
-            return Err(GeometryError::Face { face, found, vertices: vertices.len() });
-        }
-        let vertices = corners.map(|i| vertices[i as usize]);
-        geometry.push(Triangle { vertices }, Sides::Both)?;
-    }
-    Ok(())
-}
-
-/// All of them together.
-pub fn total(parts: Vec<Invalid>) -> Invalid {
-    parts.into_iter().fold(Invalid::default(), Invalid::and)
-}
-
-/// Rays of a task, `most` at most.
-pub fn block(rays: usize, threads: usize, most: usize) -> usize {
-    match threads {
-        1 => most,
-        _ => rays.div_ceil(threads.max(1) * TASKS_PER_THREAD).clamp(MIN_BLOCK, most),
-    }
-}
-
-/// The ranges of some blocks of rays.
-pub fn blocks(rays: usize, block: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..rays).step_by(block).map(move |start| start..rays.min(start + block))
-}
-
-/// Splits `n` entries off the front.
-pub fn split<'a, T>(row: &mut &'a mut [T], n: usize) -> &'a mut [T] {
-    row.split_off_mut(..n).expect("rows are as long as their parts together")
-}
-
-/// `len` if so many values can be had.
-pub fn checked<T>(len: usize) -> PyResult<usize> {
-    match Vec::<T>::new().try_reserve_exact(len) {
-        Ok(()) => Ok(len),
-        Err(_) => {
-            let bytes = len.saturating_mul(size_of::<T>());
-            Err(error::memory(format!("an array of {len} values, {bytes} bytes, cannot be had")))
-        }
-    }
-}
-
-/// So many zeros, if they can be had.
-pub fn zeros<T: bytemuck::Zeroable + Clone>(len: usize) -> PyResult<Vec<T>> {
-    Ok(vec![T::zeroed(); checked::<T>(len)?])
 }

@@ -1,12 +1,13 @@
 //! Scenes in `f64`, of meshes or of instances, and the batch queries: what [`Core`](crate::core::Core) is in
 //! `f32`.
 
-use crate::core::{Plan, Watch, blocks, checked, left_for_build, plan_of, split, total, zeros};
 use crate::error::{self, Failure};
 use crate::faces::{Faces, MeshFaces, Part, once};
 use crate::figures::Build;
+use crate::plan::{Plan, Watch, left_for_build, plan_of};
 use crate::rays::{Arrays, Invalid, View, one};
 use crate::surface::Surface;
+use crate::tasks::{block, blocks, checked, split, total, zeros};
 use crate::work;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -359,7 +360,7 @@ impl DoubleCore {
         let view = arrays.view()?;
         let n = view.count;
         let (mut t, mut prim, mut geom) = (zeros::<f64>(n)?, zeros::<i32>(n)?, zeros::<i32>(n)?);
-        let block = crate::core::block(n, threads, BLOCK);
+        let block = block(n, threads, BLOCK);
         let chunks = t.chunks_mut(block).zip(prim.chunks_mut(block)).zip(geom.chunks_mut(block));
         let tasks = blocks(n, block).zip(chunks).collect();
         let trace = |(range, ((t, prim), geom)): (Range<usize>, (TAndPrim<'_>, _))| {
@@ -403,7 +404,7 @@ impl DoubleCore {
         let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let mut hit = vec![false; checked::<bool>(view.count)?];
-        let block = crate::core::block(view.count, threads, BLOCK);
+        let block = block(view.count, threads, BLOCK);
         let tasks = blocks(view.count, block).zip(hit.chunks_mut(block)).collect();
         let trace = |(range, hit): (Range<usize>, &mut [bool])| {
             let (rays, invalid) = rays_of(&view, range.clone());
@@ -433,7 +434,7 @@ impl DoubleCore {
         let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let mut counts = zeros::<i32>(view.count)?;
-        let block = crate::core::block(view.count, threads, BLOCK);
+        let block = block(view.count, threads, BLOCK);
         let tasks = blocks(view.count, block).zip(counts.chunks_mut(block)).collect();
         let trace = |(range, counts): (Range<usize>, &mut [i32])| {
             let (rays, invalid) = rays_of(&view, range.clone());
@@ -471,7 +472,7 @@ impl DoubleCore {
         let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let (n, k) = (view.count, k.unwrap_or(usize::MAX));
-        let ranges = blocks(n, crate::core::block(n, threads, BLOCK)).collect();
+        let ranges = blocks(n, block(n, threads, BLOCK)).collect();
         let trace = |range: Range<usize>| {
             let (rays, invalid) = rays_of(&view, range.clone());
             (self.first_of(&view, &range, &rays, k), invalid)
@@ -538,7 +539,7 @@ impl DoubleCore {
         }
         let width = surface.width();
         let mut values = zeros::<f64>(n * width)?;
-        let block = crate::core::block(n, threads, BLOCK);
+        let block = block(n, threads, BLOCK);
         let tasks = blocks(n, block).zip(values.chunks_mut(block * width)).collect();
         let look = |(range, values): (Range<usize>, &mut [f64])| {
             let mut lost = 0;

@@ -14,10 +14,13 @@ mod faces;
 mod figures;
 mod file;
 mod mesh;
+mod meshes;
+mod plan;
 mod points;
 mod rays;
 mod state;
 mod surface;
+mod tasks;
 mod walker;
 mod work;
 

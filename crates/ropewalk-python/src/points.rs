@@ -1,8 +1,9 @@
 //! Batches of points: the queries of `ropewalk::point` over a scene of triangles.
 
-use crate::core::{Core, zeros};
+use crate::core::Core;
 use crate::double::DoubleCore;
 use crate::faces::Faces;
+use crate::tasks::zeros;
 use crate::{error, work};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;

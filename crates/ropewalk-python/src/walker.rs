@@ -1,9 +1,10 @@
 //! Particles moved along segments, and cells to start from.
 
-use crate::core::{Core, block, blocks, masks_that_refuse, zeros};
+use crate::core::{Core, masks_that_refuse};
 use crate::double::DoubleCore;
 use crate::faces::Faces;
 use crate::points::Asked;
+use crate::tasks::{block, blocks, zeros};
 use crate::{error, rays, work};
 use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;

@@ -63,22 +63,11 @@ mod tests {
     use super::*;
     use crate::aabb::Aabb;
     use crate::kernel::beam::PortableLanes;
+    use crate::kernel::random::Random;
     use crate::kernel::slot::Loaded;
     use crate::primitive::{Cone, Primitive, Shape, Sides, Sphere};
     use crate::ray::PreparedRay;
     use crate::wide::{Bound, WIDTH};
-
-    /// Numbers from a fixed seed (xorshift).
-    struct Random(u64);
-
-    impl Random {
-        fn signed(&mut self) -> f32 {
-            self.0 ^= self.0 << 13;
-            self.0 ^= self.0 >> 7;
-            self.0 ^= self.0 << 17;
-            (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
-        }
-    }
 
     /// Spheres and cones of all sizes, far from the origin and near, and rays that graze them from far and near: no
     /// hit is dropped, though most misses are.
