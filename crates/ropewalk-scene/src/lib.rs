@@ -14,6 +14,7 @@ pub mod nff;
 mod sink;
 mod source;
 pub mod spd;
+pub mod stage;
 mod watched;
 
 pub use file::write_atomically;
@@ -22,3 +23,4 @@ pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, Scene
 pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};
 pub use nff::{format_g, read_nff};
 pub use source::{Fault, Loaded, SceneError, load, load_monitored, load_scene, parse_builtin};
+pub use stage::Stage;

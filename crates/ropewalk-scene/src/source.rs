@@ -278,7 +278,7 @@ fn load_file(spec: &str, limits: &NffLimits, monitor: &dyn Monitor) -> Result<Sc
 }
 
 /// The file's name without `.gz` and without the extension before it, if it is a known one.
-fn stem(path: &Path) -> String {
+pub(crate) fn stem(path: &Path) -> String {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.strip_suffix(".gz").unwrap_or(&name);
     let known =
