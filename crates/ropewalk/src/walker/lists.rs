@@ -1,7 +1,7 @@
 //! Particles with lists of segments, as the lanes of a wave take them.
 
-use super::{Crossed, CrossingFilter, Crossings, Encounter, Float, WalkerGeometry, end_of};
-use crate::kernel::{Before, Crowd, WAVE};
+use super::{Crossed, CrossingFilter, Encounter, Float, WalkerGeometry, end_of};
+use crate::kernel::{BatchCaster, Before, Crossings, Crowd, Lanes, WAVE, WalkReport};
 use crate::ray::Ray;
 
 /// A crossing of a particle.
@@ -18,7 +18,7 @@ pub struct Record<T> {
 }
 
 /// The particles of a task.
-pub struct Lists<'a, F, G: WalkerGeometry> {
+pub struct Lists<'a, G: WalkerGeometry> {
     geometry: &'a G,
     /// Where the segments of each particle begin, and where the last ones end.
     offsets: &'a [usize],
@@ -30,7 +30,7 @@ pub struct Lists<'a, F, G: WalkerGeometry> {
     walked: &'a mut [u32],
     encounter: Encounter,
     /// Decides which crossings count.
-    filter: &'a F,
+    filter: &'a dyn CrossingFilter,
     /// The index of the first particle among all, as the filter knows them.
     first: usize,
     /// The particle of each lane.
@@ -49,7 +49,7 @@ type State<'a, T> = (&'a mut [[T; 3]], &'a mut [u32], &'a mut [u32]);
 /// Directions and lengths of segments.
 type Segments<'a, T> = (&'a [[T; 3]], &'a [T]);
 
-impl<'a, F: CrossingFilter, G: WalkerGeometry> Lists<'a, F, G> {
+impl<'a, G: WalkerGeometry> Lists<'a, G> {
     /// Particles with their rows of segments, the first of which is number `first` of all.
     pub fn new(
         geometry: &'a G,
@@ -57,7 +57,7 @@ impl<'a, F: CrossingFilter, G: WalkerGeometry> Lists<'a, F, G> {
         (directions, lengths): Segments<'a, G::Float>,
         (positions, stopped, walked): State<'a, G::Float>,
         encounter: Encounter,
-        (filter, first): (&'a F, usize),
+        (filter, first): (&'a dyn CrossingFilter, usize),
     ) -> Self {
         Lists {
             geometry,
@@ -144,7 +144,7 @@ impl<'a, F: CrossingFilter, G: WalkerGeometry> Lists<'a, F, G> {
     }
 }
 
-impl<'a, F: CrossingFilter, G: WalkerGeometry> Crowd<Crossings<'a, G>> for Lists<'a, F, G> {
+impl<'a, G: WalkerGeometry> Crowd<Crossings<'a, G>> for Lists<'a, G> {
     #[inline(always)]
     fn advance(&mut self, k: usize, query: &mut Crossings<'a, G>, before: Before) -> Option<Ray> {
         let goes_on = match before {
@@ -164,4 +164,16 @@ impl<'a, F: CrossingFilter, G: WalkerGeometry> Crowd<Crossings<'a, G>> for Lists
         }
         None
     }
+}
+
+/// What the particles of a task met, segments without an end, and how the segments went.
+pub type Part<T> = ((Vec<Record<T>>, usize), WalkReport);
+
+/// Moves the particles of a task.
+pub fn walk<G: WalkerGeometry>(caster: &BatchCaster<'_>, lists: Lists<'_, G>) -> Part<G::Float> {
+    let (width, mut query) = (lists.len().min(WAVE), Crossings::new(lists.geometry));
+    let mut lanes = Lanes::new(caster.tree(), width, lists);
+    caster.run_lanes(width, &mut query, &mut lanes);
+    let (lists, report) = lanes.into_parts();
+    (lists.into_records(), report)
 }

@@ -18,9 +18,9 @@ pub(crate) use crossing::crossing;
 pub use precision::{Float, WalkerGeometry};
 
 use crate::geometry::Geometry;
-use crate::kernel::{BatchCaster, Crossings, Lanes, Level, Masks, NoFilter, WAVE, WalkReport};
+use crate::kernel::{BatchCaster, Level, Masks, NoFilter, WalkReport};
 use crate::point::{Cell, PointError, PointQueries};
-use lists::{Lists, Record};
+use lists::{Lists, Part};
 use rayon::prelude::*;
 
 /// What a particle does at a triangle.
@@ -271,10 +271,11 @@ impl<'a, F: CrossingFilter, G: WalkerGeometry> Walker<'a, F, G> {
         let mut walked = vec![0u32; n];
         let serial = self.caster.threads() == 1 || n <= TASK;
         let task = if serial { n.max(1) } else { TASK };
-        let (caster, geometry, filter) = (self.caster, self.geometry, &self.filter);
+        let (caster, geometry, filter) =
+            (self.caster, self.geometry, &self.filter as &dyn CrossingFilter);
         let parts = self.positions.chunks_mut(task).zip(self.stopped.chunks_mut(task));
         let parts = parts.zip(walked.chunks_mut(task)).enumerate();
-        let tasks: Vec<Lists<'_, F, G>> = parts
+        let tasks: Vec<Lists<'_, G>> = parts
             .map(|(i, ((positions, stopped), walked))| {
                 let rows = &offsets[i * task..=i * task + positions.len()];
                 let state = (positions, stopped, walked);
@@ -282,13 +283,7 @@ impl<'a, F: CrossingFilter, G: WalkerGeometry> Walker<'a, F, G> {
                 Lists::new(geometry, rows, segments, state, encounter, (filter, i * task))
             })
             .collect();
-        let run = |lists: Lists<'_, F, G>| {
-            let width = lists.len().min(WAVE);
-            let mut lanes = Lanes::new(caster.tree(), width, lists);
-            caster.run_lanes(width, &mut Crossings::new(geometry), &mut lanes);
-            let (lists, report) = lanes.into_parts();
-            (lists.into_records(), report)
-        };
+        let run = |lists: Lists<'_, G>| G::walk(&caster, lists);
         let parts: Vec<Part<G::Float>> = if serial {
             tasks.into_iter().map(run).collect()
         } else {
@@ -297,9 +292,6 @@ impl<'a, F: CrossingFilter, G: WalkerGeometry> Walker<'a, F, G> {
         gather(&parts, task, walked)
     }
 }
-
-/// What a task met, segments without an end, and how its segments went.
-type Part<T> = ((Vec<Record<T>>, usize), WalkReport);
 
 /// The rows of all tasks.
 fn gather<T: Float>(parts: &[Part<T>], task: usize, walked: Vec<u32>) -> Events<T> {

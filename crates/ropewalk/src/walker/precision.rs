@@ -1,7 +1,9 @@
 //! What particles move among: triangles in `f32` or in `f64`, and the numbers of the particles themselves.
 
+use super::lists::{Lists, Part, walk};
 use crate::double::{DoubleGeometry, DoubleRay, Narrowed};
 use crate::geometry::Geometry;
+use crate::kernel::BatchCaster;
 use crate::point::Triangles;
 use crate::ray::Ray;
 use std::fmt::Debug;
@@ -44,6 +46,13 @@ pub trait WalkerGeometry: Triangles {
     /// The ray with which the tree is searched for what the segment between two points may cross, in the
     /// numbers of the tree.
     fn search_ray(&self, from: [Self::Float; 3], to: [Self::Float; 3]) -> Ray;
+
+    /// Moves the particles of a task. Each geometry has its own, so that its kernels are compiled in this crate
+    /// alone.
+    #[doc(hidden)]
+    fn walk(caster: &BatchCaster<'_>, lists: Lists<'_, Self>) -> Part<Self::Float>
+    where
+        Self: Sized;
 }
 
 /// The ray of a segment begins earlier and ends later by this share of it. The filters bound their
@@ -62,6 +71,10 @@ impl WalkerGeometry for Geometry {
     fn search_ray(&self, from: [f32; 3], to: [f32; 3]) -> Ray {
         let dir = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
         Ray::new(from, dir).with_range(-BEYOND, 1.0 + BEYOND)
+    }
+
+    fn walk(caster: &BatchCaster<'_>, lists: Lists<'_, Self>) -> Part<Self::Float> {
+        walk(caster, lists)
     }
 }
 
@@ -87,5 +100,9 @@ impl WalkerGeometry for DoubleGeometry {
             Narrowed::Misses => NOWHERE,
             Narrowed::Beyond => EXTREME,
         }
+    }
+
+    fn walk(caster: &BatchCaster<'_>, lists: Lists<'_, Self>) -> Part<Self::Float> {
+        walk(caster, lists)
     }
 }

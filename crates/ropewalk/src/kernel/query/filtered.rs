@@ -87,39 +87,48 @@ fn mix(mut x: u64) -> u64 {
     x ^ x >> 31
 }
 
+/// A filter of any type, as the kernels see it.
+pub trait Accepts: Sync {
+    /// See [`HitFilter::accepts`].
+    fn accepts(&self, ray: usize, hit: &Hit) -> bool;
+}
+
+impl<F: HitFilter> Accepts for F {
+    fn accepts(&self, ray: usize, hit: &Hit) -> bool {
+        HitFilter::accepts(self, ray, hit)
+    }
+}
+
 /// A query that sees only hits that a filter accepts.
-pub struct Filtered<'a, Q, F> {
+pub struct Filtered<'a, Q> {
     /// The query.
-    pub query: Q,
+    pub query: &'a mut Q,
     /// The filter.
-    pub filter: &'a F,
+    pub filter: &'a dyn Accepts,
     /// Index in the batch of the first ray.
     pub first_ray: usize,
 }
 
-impl<Q: BatchQuery, F: HitFilter> BatchQuery for Filtered<'_, Q, F> {
+impl<Q: BatchQuery> BatchQuery for Filtered<'_, Q> {
     const ANY: bool = Q::ANY;
     const MANY: bool = Q::MANY;
 
+    /// The filter sees exact hits only.
     #[inline(always)]
     unsafe fn take_clear<L: Simd>(
         &mut self,
-        k: usize,
-        slot: &mut Slot,
+        _k: usize,
+        _slot: &mut Slot,
         hits: &Clear<'_>,
-        exact: &Exact<'_>,
+        _exact: &Exact<'_>,
     ) -> u32 {
         const { assert!(!Q::ROUNDED, "it sees hits in f32 alone") };
-        if F::FILTERS {
-            return hits.lanes;
-        }
-        // SAFETY: passed on to the caller.
-        unsafe { self.query.take_clear::<L>(k, slot, hits, exact) }
+        hits.lanes
     }
 
     #[inline(always)]
     fn take(&mut self, k: usize, slot: &mut Slot, hit: &Hit, exact: &Exact<'_>) {
-        if !F::FILTERS || self.filter.accepts(self.first_ray + slot.ray as usize, hit) {
+        if self.filter.accepts(self.first_ray + slot.ray as usize, hit) {
             self.query.take(k, slot, hit, exact);
         }
     }

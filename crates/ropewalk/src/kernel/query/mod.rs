@@ -14,7 +14,7 @@ pub use closest::Closest;
 pub use count::Count;
 pub use crossings::Crossings;
 pub use every::Every;
-pub use filtered::{Filtered, HitFilter, Masks, NoFilter, Opacity};
+pub use filtered::{Accepts, Filtered, HitFilter, Masks, NoFilter, Opacity};
 
 use super::exact::{Exact, place};
 use super::level::{Range, Simd};
