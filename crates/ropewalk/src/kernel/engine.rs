@@ -312,6 +312,7 @@ impl<'a> Engine<'a> {
     }
 
     /// Puts one ray to `query`; see [`single`](super::single::single).
+    #[inline(always)]
     fn run_one<Q: BatchQuery, E: Events>(
         &self,
         leaves: &Leaves<'_>,
@@ -328,6 +329,7 @@ impl<'a> Engine<'a> {
         }
     }
 
+    #[inline(always)]
     fn one<Q: BatchQuery, E: Events>(
         &self,
         leaves: &Leaves<'_>,
@@ -351,7 +353,7 @@ impl<'a> Engine<'a> {
     }
 
     /// All rays in the wave, the first of which is `first_ray` in the batch.
-    pub fn run_wave<Q: BatchQuery, E: Events>(
+    fn run_wave<Q: BatchQuery, E: Events>(
         &self,
         rays: &[Ray],
         way: Way,
@@ -360,6 +362,10 @@ impl<'a> Engine<'a> {
         events: &mut E,
     ) -> BatchReport {
         let report = BatchReport { wave_rays: rays.len() as u64, ..BatchReport::default() };
+        if way == Way::Root {
+            self.run_from_root(rays, query, events);
+            return report;
+        }
         with_room(|room| {
             let width = rays.len().min(WAVE);
             let slots = &mut room.slots[..width];
@@ -371,19 +377,30 @@ impl<'a> Engine<'a> {
                 let Climb { started, climbed, .. } = source.into_climb();
                 return BatchReport { cell_rays: started, climbed_rays: climbed, ..report };
             }
-            if way == Way::Entry
-                && let Some(path) = Path::new(self.tree)
-            {
+            if let Some(path) = Path::new(self.tree) {
                 let mut source = FromEntry::new(rays, path);
                 self.run_source(slots, query, &mut source, events);
                 return BatchReport { entry_rays: report.wave_rays, ..report };
             }
-            room.order.clear();
-            room.order.extend(0..rays.len() as u32);
-            let mut source = FromRoot::new(rays, &room.order);
-            self.run_source(slots, query, &mut source, events);
+            // A tree of one leaf.
+            self.run_from_root(rays, query, events);
             report
         })
+    }
+
+    /// All rays in the wave, from the root.
+    pub fn run_from_root<Q: BatchQuery, E: Events>(
+        &self,
+        rays: &[Ray],
+        query: &mut Q,
+        events: &mut E,
+    ) {
+        with_room(|room| {
+            let slots = &mut room.slots[..rays.len().min(WAVE)];
+            room.order.clear();
+            room.order.extend(0..rays.len() as u32);
+            self.run_source(slots, query, &mut FromRoot::new(rays, &room.order), events);
+        });
     }
 
     /// The cells of the rays from `first_ray` on.
@@ -411,7 +428,10 @@ impl<'a> Engine<'a> {
         source: &mut S,
         events: &mut E,
     ) {
-        if self.tree.has_shapes() {
+        if Q::TRIANGLES {
+            debug_assert!(!self.tree.has_shapes());
+            self.wave::<Q, S, E, false>(slots, query, source, events);
+        } else if self.tree.has_shapes() {
             self.wave::<Q, S, E, true>(slots, query, source, events);
         } else {
             self.wave::<Q, S, E, false>(slots, query, source, events);

@@ -220,6 +220,7 @@ impl<'a, G: Gather> Decide<'a, G> {
 impl<G: Gather> BatchQuery for Decide<'_, G> {
     const ANY: bool = G::ANY;
     const ROUNDED: bool = true;
+    const TRIANGLES: bool = true;
 
     #[inline(always)]
     unsafe fn take_clear<L: Simd>(

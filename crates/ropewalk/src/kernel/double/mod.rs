@@ -3,11 +3,11 @@
 mod decide;
 mod gather;
 
-use super::engine::{Engine, TASK, Way};
+use super::BatchEvents;
+use super::engine::{Engine, TASK};
 use super::events::{Events, NoEvents};
 use super::level::Level;
 use super::query::NoFilter;
-use super::{BatchEvents, Start};
 use crate::double::{DoubleGeometry, DoubleHit, DoubleRay, DoubleTree, Narrowed, Place};
 use crate::ray::Ray;
 use decide::Decide;
@@ -81,7 +81,7 @@ impl<'a> DoubleCaster<'a> {
     /// A caster at the best level of this machine, on all threads of the current rayon pool. `tree` must
     /// have been built over `geometry`.
     pub fn new(tree: &'a DoubleTree, geometry: &'a DoubleGeometry) -> Self {
-        let engine = Engine { start: Start::Root, ..Engine::new(tree.wide(), geometry.none()) };
+        let engine = Engine::new(tree.wide(), geometry.none());
         DoubleCaster { asker: Asker { engine, geometry, filter: None }, filter: NoFilter }
     }
 }
@@ -275,7 +275,7 @@ impl Asker<'_> {
         }
         let scene = (self.geometry, self.filter);
         let mut decide = Decide::new(scene, (rays, &places, first_ray), gather);
-        self.engine.run_wave(&narrowed, Way::Root, 0, &mut decide, events);
+        self.engine.run_from_root(&narrowed, &mut decide, events);
         for index in beyond {
             decide.answer_alone(index);
         }

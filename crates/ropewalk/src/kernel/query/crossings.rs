@@ -55,6 +55,7 @@ impl<G: WalkerGeometry> BatchQuery for Crossings<'_, G> {
     const ANY: bool = false;
     const ROUNDED: bool = G::ROUNDED;
     const CANDIDATES: bool = true;
+    const TRIANGLES: bool = true;
 
     #[inline(always)]
     unsafe fn take_clear<L: Simd>(

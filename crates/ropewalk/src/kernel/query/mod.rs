@@ -42,6 +42,8 @@ pub trait BatchQuery {
     /// True if rays and triangles have been rounded from `f64`: filters leave room for that, and every
     /// lane they let through comes to [`BatchQuery::decide`].
     const ROUNDED: bool = false;
+    /// True if it is put to trees of triangles alone, so that kernels for other primitives need not be compiled for it.
+    const TRIANGLES: bool = false;
     /// True if hits end no ray, so that blocks may well have several: they are tested in full at once
     /// where that pays.
     const MANY: bool = false;
