@@ -20,7 +20,7 @@ use super::scalar::Scalar;
 use super::single::with_slot;
 use super::slot::Slot;
 use super::sorted::{GROUP, SMALLEST, Sorter, Sorting};
-use super::source::{FromCells, FromEntry, FromRoot, Source};
+use super::source::{FromEntry, FromRoot, Search, Source};
 use super::wave::WAVE;
 use crate::geometry::Geometry;
 use crate::point::Cell;
@@ -362,29 +362,27 @@ impl<'a> Engine<'a> {
         events: &mut E,
     ) -> BatchReport {
         let report = BatchReport { wave_rays: rays.len() as u64, ..BatchReport::default() };
-        if way == Way::Root {
+        let search = match way {
+            Way::Root => None,
+            Way::Entry => Path::new(self.tree).map(|path| Search::Path(Box::new(path))),
+            Way::Cells => {
+                Climb::new(self.tree).map(|climb| Search::Cells(self.cells_from(first_ray), climb))
+            }
+        };
+        let Some(search) = search else {
             self.run_from_root(rays, query, events);
             return report;
-        }
+        };
         with_room(|room| {
-            let width = rays.len().min(WAVE);
-            let slots = &mut room.slots[..width];
-            if way == Way::Cells
-                && let Some(climb) = Climb::new(self.tree)
-            {
-                let mut source = FromCells::new(rays, self.cells_from(first_ray), climb);
-                self.run_source(slots, query, &mut source, events);
-                let Climb { started, climbed, .. } = source.into_climb();
-                return BatchReport { cell_rays: started, climbed_rays: climbed, ..report };
+            let slots = &mut room.slots[..rays.len().min(WAVE)];
+            let mut source = FromEntry::new(rays, search);
+            self.run_source(slots, query, &mut source, events);
+            match source.into_search() {
+                Search::Path(_) => BatchReport { entry_rays: report.wave_rays, ..report },
+                Search::Cells(_, Climb { started, climbed, .. }) => {
+                    BatchReport { cell_rays: started, climbed_rays: climbed, ..report }
+                }
             }
-            if let Some(path) = Path::new(self.tree) {
-                let mut source = FromEntry::new(rays, path);
-                self.run_source(slots, query, &mut source, events);
-                return BatchReport { entry_rays: report.wave_rays, ..report };
-            }
-            // A tree of one leaf.
-            self.run_from_root(rays, query, events);
-            report
         })
     }
 

@@ -68,17 +68,30 @@ impl<Q: BatchQuery> Source<Q> for FromRoot<'_> {
     }
 }
 
-/// All rays in order, each from its entry, searched for from where the ray before was.
+/// All rays in order, each from its entry.
 pub struct FromEntry<'a> {
     rays: &'a [Ray],
     next: usize,
-    path: Path,
+    search: Search<'a>,
+}
+
+/// From where entries are searched for: one type, so that the wave is compiled for one.
+pub enum Search<'a> {
+    /// From where the ray before was.
+    Path(Box<Path>),
+    /// From the cell that is given for each ray; rays beyond the end of these have none.
+    Cells(&'a [Option<Cell>], Climb<'a>),
 }
 
 impl<'a> FromEntry<'a> {
-    /// From the first ray on; `path` belongs to the tree.
-    pub fn new(rays: &'a [Ray], path: Path) -> Self {
-        FromEntry { rays, next: 0, path }
+    /// From the first ray on; what is searched belongs to the tree.
+    pub fn new(rays: &'a [Ray], search: Search<'a>) -> Self {
+        FromEntry { rays, next: 0, search }
+    }
+
+    /// How the rays went.
+    pub fn into_search(self) -> Search<'a> {
+        self.search
     }
 }
 
@@ -100,56 +113,16 @@ impl<Q: BatchQuery> Source<Q> for FromEntry<'_> {
             let index = self.next;
             self.next += 1;
             // SAFETY: passed on to the caller.
-            match unsafe { self.path.enter::<L, E>(tree, ray, events) } {
-                Some(code) => return Some((index, code)),
-                None => query.miss(index),
-            }
-        }
-        None
-    }
-}
-
-/// All rays in order, each from the cell that is given for it.
-pub struct FromCells<'a> {
-    rays: &'a [Ray],
-    /// One a ray; rays beyond its end have none.
-    cells: &'a [Option<Cell>],
-    next: usize,
-    climb: Climb<'a>,
-}
-
-impl<'a> FromCells<'a> {
-    /// From the first ray on; `climb` belongs to the tree.
-    pub fn new(rays: &'a [Ray], cells: &'a [Option<Cell>], climb: Climb<'a>) -> Self {
-        FromCells { rays, cells, next: 0, climb }
-    }
-
-    /// How the rays went.
-    pub fn into_climb(self) -> Climb<'a> {
-        self.climb
-    }
-}
-
-impl<Q: BatchQuery> Source<Q> for FromCells<'_> {
-    #[inline(always)]
-    fn rays(&self) -> &[Ray] {
-        self.rays
-    }
-
-    #[inline(always)]
-    unsafe fn next<L: Simd, E: Events>(
-        &mut self,
-        _k: usize,
-        tree: &WideTree,
-        query: &mut Q,
-        events: &mut E,
-    ) -> Option<(usize, u32)> {
-        while let Some(ray) = self.rays.get(self.next) {
-            let index = self.next;
-            self.next += 1;
-            let cell = self.cells.get(index).copied().flatten();
-            // SAFETY: passed on to the caller.
-            match unsafe { self.climb.enter::<L, E>(tree, ray, cell, events) } {
+            let entry = unsafe {
+                match &mut self.search {
+                    Search::Path(path) => path.enter::<L, E>(tree, ray, events),
+                    Search::Cells(cells, climb) => {
+                        let cell = cells.get(index).copied().flatten();
+                        climb.enter::<L, E>(tree, ray, cell, events)
+                    }
+                }
+            };
+            match entry {
                 Some(code) => return Some((index, code)),
                 None => query.miss(index),
             }

@@ -10,11 +10,9 @@ use crate::ray::{PreparedRay, Shear};
 /// Intersected after Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection" (JCGT 2013):
 /// the vertices are sheared into the ray's frame, where each edge function is the same for both
 /// triangles of an edge up to its sign. Products are rounded monotonically, so that a computed sign
-/// is right or zero; a zero is computed again exactly, and if it stays the ray is thought of as moved
-/// by an infinitely small step across (Edelsbrunner and Mücke, "Simulation of Simplicity", 1990). So a
-/// ray through edges or vertices of a closed surface crosses it as its neighbours do: each time in one triangle,
-/// never lost, never twice. A triangle that the ray meets exactly edge-on is missed; its neighbours
-/// are not.
+/// is right or zero; a zero is computed again exactly, and if it stays it counts as inside: a ray
+/// through a shared edge or vertex of a closed mesh is never lost. A triangle that the ray meets
+/// exactly edge-on is missed; its neighbours are not.
 ///
 /// Error: a hit lies on the triangle whose vertices are moved by at most `2^-51 |p - origin|`
 /// across the ray, and along it off by at most `2^-42` of the triangle's depth; it lies between
@@ -93,7 +91,7 @@ impl Triangle {
         let products = product(c, b) + product(a, c) + product(b, a);
         if u == 0.0 || v == 0.0 || w == 0.0 || (u + v + w).abs() < EDGE_FILTER * products {
             (u, v, w) = (edge_exactly(c, b), edge_exactly(a, c), edge_exactly(b, a));
-            if of_both_signs(moved(u, c, b), moved(v, a, c), moved(w, b, a)) {
+            if of_both_signs(u, v, w) {
                 return None;
             }
         }
@@ -147,18 +145,6 @@ fn edge(p: [f64; 3], q: [f64; 3]) -> f64 {
 fn edge_exactly(p: [f64; 3], q: [f64; 3]) -> f64 {
     let (a, b) = (p[0] * q[1], p[1] * q[0]);
     (a - b) + (p[0].mul_add(q[1], -a) - p[1].mul_add(q[0], -b))
-}
-
-/// The sign of an edge function, or of what it becomes if it is zero and the ray is moved by an infinitely small step
-/// along x and an infinitely smaller one along y: one sign for both triangles of an edge. Zero only for two vertices in
-/// one place, whose triangles are seen edge-on.
-#[cold]
-fn moved(edge: f64, p: [f64; 3], q: [f64; 3]) -> f64 {
-    match (edge == 0.0, p[1] == q[1]) {
-        (false, _) => edge,
-        (true, false) => p[1] - q[1],
-        (true, true) => q[0] - p[0],
-    }
 }
 
 #[inline]
