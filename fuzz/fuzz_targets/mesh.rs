@@ -10,6 +10,6 @@ use ropewalk_scene::MeshFormat;
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     if let Some((&first, rest)) = bytes.split_first() {
         let format = MeshFormat::ALL[usize::from(first) % MeshFormat::ALL.len()];
-        property::reads_or_refuses(format, rest);
+        property::reads_or_refuses(format, rest, None);
     }
 });

@@ -460,7 +460,8 @@ fn buffers_beside_the_file_and_nowhere_else() {
 
 #[test]
 fn limits_hold() {
-    let small = MeshLimits { bytes: 10_000, vertices: 3, faces: 3, corners: 4 };
+    let small =
+        MeshLimits { bytes: 10_000, vertices: 3, faces: 3, corners: 4, images: 2, pixels: 100 };
     let refused = |text: &str, limits: MeshLimits| {
         Mesh::parse(MeshFormat::Obj, text.as_bytes(), None, &limits).unwrap_err().to_string()
     };
@@ -482,19 +483,19 @@ fn damaged_files_are_read_or_refused() {
     let mut state = 1u64;
     for (format, bytes) in all() {
         for end in 0..bytes.len() {
-            property::reads_or_refuses(format, &bytes[..end]);
+            property::reads_or_refuses(format, &bytes[..end], None);
         }
         for at in 0..bytes.len() {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             for byte in [0, 0xff, b'-', b'9', b'\n', (state >> 56) as u8] {
                 let mut damaged = bytes.clone();
                 damaged[at] = byte;
-                property::reads_or_refuses(format, &damaged);
+                property::reads_or_refuses(format, &damaged, None);
             }
         }
         // As every other format.
         for other in MeshFormat::ALL {
-            property::reads_or_refuses(other, &bytes);
+            property::reads_or_refuses(other, &bytes, None);
         }
     }
 }
@@ -531,9 +532,9 @@ fn the_fuzz_corpus_holds() {
         let bytes = std::fs::read(&path).unwrap();
         let (&first, rest) = bytes.split_first().unwrap();
         let format = MeshFormat::ALL[usize::from(first) % MeshFormat::ALL.len()];
-        assert!(property::reads_or_refuses(format, rest), "{}", path.display());
+        assert!(property::reads_or_refuses(format, rest, None), "{}", path.display());
         for end in 0..rest.len() {
-            property::reads_or_refuses(format, &rest[..end]);
+            property::reads_or_refuses(format, &rest[..end], None);
         }
         count += 1;
     }
