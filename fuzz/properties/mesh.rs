@@ -1,6 +1,6 @@
 //! What must hold of the mesh readers for any bytes. Shared by the fuzz target and by the ordinary tests.
 
-use ropewalk_scene::{Mesh, MeshFormat, MeshLimits, Stage, stage};
+use ropewalk_scene::{Mesh, MeshFormat, MeshLimits, MeshOutput, Stage, stage};
 use std::path::Path;
 
 /// Small, so that a short input reaches each of them.
@@ -37,6 +37,8 @@ pub fn reads_or_refuses(format: MeshFormat, bytes: &[u8], folder: Option<&Path>)
     assert!(mesh.vertices.len() <= LIMITS.vertices);
     assert!(mesh.faces.iter().flatten().all(|&i| (i as usize) < mesh.vertices.len()));
     assert!(mesh.vertices.iter().flatten().all(|&x| (x as f32).is_finite()));
+    check_writers(&mesh);
+    assert!(mesh.defects(&()).is_some());
     match dressed {
         Ok(stage) => {
             assert_eq!(stage.mesh, mesh);
@@ -46,6 +48,41 @@ pub fn reads_or_refuses(format: MeshFormat, bytes: &[u8], folder: Option<&Path>)
         Err(error) => assert_eq!(format, MeshFormat::Gltf, "{error}"),
     }
     true
+}
+
+/// The same of an OBJ file up to the first zero byte, with `a.mtl` and `a.png` beside it: what stands up to the next one, and the rest.
+///
+/// # Panics
+/// If the property does not hold, or nothing can be written to the folder.
+#[allow(dead_code)]
+pub fn reads_or_refuses_with_library(bytes: &[u8], folder: &Path) -> bool {
+    let mut parts = bytes.splitn(3, |&b| b == 0);
+    let obj = parts.next().unwrap_or_default();
+    for name in ["a.mtl", "a.png"] {
+        let bytes = parts.next().unwrap_or_default();
+        std::fs::write(folder.join(name), bytes).expect("the folder is written to");
+    }
+    reads_or_refuses(MeshFormat::Obj, obj, Some(folder))
+}
+
+/// What is written of a mesh is read back.
+fn check_writers(mesh: &Mesh) {
+    let corners = |mesh: &Mesh| -> Vec<[[f64; 3]; 3]> {
+        mesh.faces.iter().map(|face| face.map(|i| mesh.vertices[i as usize])).collect()
+    };
+    for (output, format) in [
+        (MeshOutput::Obj, MeshFormat::Obj),
+        (MeshOutput::Ply, MeshFormat::Ply),
+        (MeshOutput::Stl, MeshFormat::Stl),
+        (MeshOutput::Off, MeshFormat::Off),
+        (MeshOutput::Glb, MeshFormat::Gltf),
+    ] {
+        let mut bytes = Vec::new();
+        mesh.write(output, &mut bytes).expect("memory is written to");
+        let read = Mesh::parse(format, &bytes, None, &MeshLimits::DEFAULT).expect("our own file");
+        assert_eq!(read.faces.len(), mesh.faces.len());
+        assert!(output.rounds() || corners(&read) == corners(mesh), "{output:?}");
+    }
 }
 
 /// What every stage must be.

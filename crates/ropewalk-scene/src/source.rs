@@ -212,7 +212,7 @@ pub fn load_scene(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
 ///
 /// # Errors
 /// Of opening it and reading these, and [`SceneError::NotGzip`].
-fn recognise(spec: &str) -> Result<Recognised, SceneError> {
+pub fn recognise(spec: &str) -> Result<Recognised, SceneError> {
     let path = Path::new(spec);
     let cannot_open = |source| SceneError::Open { path: spec.to_owned(), source };
     if path.is_dir() {

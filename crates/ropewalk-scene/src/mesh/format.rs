@@ -51,7 +51,7 @@ impl MeshFormat {
 }
 
 /// The extension in small letters, `.gz` aside.
-fn extension(path: &Path) -> Option<String> {
+pub fn extension(path: &Path) -> Option<String> {
     let extension = |path: &Path| Some(path.extension()?.to_str()?.to_ascii_lowercase());
     let found = extension(path)?;
     if found == "gz" { extension(Path::new(path.file_stem()?)) } else { Some(found) }
@@ -151,4 +151,68 @@ fn other(head: &[u8]) -> Option<&'static str> {
 pub fn not_a_mesh(found: &str) -> MeshError {
     let what = "a mesh in OBJ, PLY, STL, OFF or glTF, told by content or by a name that ends in .obj, .ply, .stl, .off, .gltf or .glb";
     wrong(Place::Start, what, found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(name: &str, head: &[u8]) -> Recognised {
+        recognise(Path::new(name), head, Some(head.len() as u64))
+    }
+
+    #[test]
+    fn content_goes_before_the_name() {
+        use MeshFormat::{Gltf, Obj, Off, Ply, Stl};
+        let cases: [(&[u8], MeshFormat); 8] = [
+            (b"ply\r\nformat", Ply),
+            (b"glTF\x02\0\0\0", Gltf),
+            (b"\xef\xbb\xbf {\"asset\"", Gltf),
+            (b"  COFF\n3 1 0", Off),
+            (b"solid a\n", Stl),
+            (b"# a comment\n\nv 1 2 3\n", Obj),
+            (b"mtllib a.mtl\n", Obj),
+            (b"g\nv 1 2 3\n", Obj),
+        ];
+        for (head, format) in cases {
+            for name in ["x", "x.txt", "x.gz"] {
+                assert_eq!(of(name, head), Recognised::Mesh(format), "{format:?} as {name}");
+            }
+        }
+        assert_eq!(of("a.obj", b"ply\nformat"), Recognised::Mesh(Ply), "in spite of its name");
+        assert_eq!(of("a.PLY.gz", b"nothing"), Recognised::Mesh(Ply), "by its name");
+        assert_eq!(of("a.nff", b"ply\n"), Recognised::Nff, "which may begin with anything");
+        let mut stl = vec![0; 84 + 50];
+        stl[80] = 1;
+        assert_eq!(of("x", &stl), Recognised::Mesh(Stl), "by its size");
+        assert_eq!(of("x.bin", &stl[..90]), Recognised::Neither("binary data of an unknown kind"));
+    }
+
+    #[test]
+    fn first_lines_tell_nff_from_obj() {
+        for text in ["v\nfrom 1 2 3\n", "# x\nb 0 0 1\n", "f 1 1 1 1 0 0 0 0\np 3\n", "s 0 0 0 1\n"]
+        {
+            assert_eq!(of("x", text.as_bytes()), Recognised::Nff, "{text}");
+        }
+    }
+
+    #[test]
+    fn other_files_are_named() {
+        let cases: [(&[u8], &str); 6] = [
+            (b"\x89PNG\r\n\x1a\n", "a PNG image"),
+            (b"PK\x03\x04abc", "a ZIP archive (3MF and USDZ are ones too)"),
+            (b"Kaydara FBX Binary  ", "an FBX file"),
+            (b"<?xml version", "XML or HTML"),
+            (b"Dear reader", "text of an unknown kind"),
+            (b" \n", "an empty file"),
+        ];
+        for (head, what) in cases {
+            assert_eq!(of("x", head), Recognised::Neither(what));
+        }
+        let sentence = not_a_mesh("an FBX file").to_string();
+        assert!(
+            sentence.contains("told by content") && sentence.ends_with("found an FBX file"),
+            "{sentence}"
+        );
+    }
 }

@@ -2,9 +2,10 @@
 //!
 //! [`Mesh`] reads positions and faces, [`Stage`](crate::Stage) what a file says of looks too. Whatever a file announces is
 //! checked against its size before memory is taken for it, and every error says where it is and what was expected there.
-//! Large binary files are read piece by piece.
+//! Large binary files are read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong.
 
 mod beside;
+mod defects;
 mod error;
 mod format;
 mod gltf;
@@ -19,11 +20,14 @@ mod skipped;
 mod soup;
 mod stl;
 mod text;
+mod write;
 
+pub use defects::Defects;
 pub use error::{MeshError, MeshErrorKind, Place};
-pub use format::MeshFormat;
-pub(crate) use format::{HEAD, Recognised, recognise};
+pub(crate) use format::{HEAD, recognise};
+pub use format::{MeshFormat, Recognised};
 pub(crate) use input::GZIP_MAGIC;
+pub use write::MeshOutput;
 
 use crate::stage::{Material, Stage};
 use crate::watched::Cancelled;

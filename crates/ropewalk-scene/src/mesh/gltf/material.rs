@@ -200,7 +200,10 @@ fn texture(
     limits: &Watched<'_>,
 ) -> Result<Option<Texture>> {
     let json = source.json;
-    let index = integer(info, "index", "textureInfo")?.unwrap_or(usize::MAX);
+    let Some(index) = integer(info, "index", "textureInfo")? else {
+        skipped.note("textures without an index");
+        return Ok(None);
+    };
     let texture = entry(json, "textures", index, "textureInfo.index")?;
     let name = format!("textures[{index}]");
     let Some(image) = integer(texture, "source", &name)? else {
