@@ -1,6 +1,7 @@
 //! Ctrl-C and progress bars.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use ropewalk::build::Monitor;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -25,6 +26,33 @@ pub fn flag() -> Arc<AtomicBool> {
 /// The error after Ctrl-C.
 pub fn interrupted() -> anyhow::Error {
     anyhow::anyhow!("interrupted; nothing was written")
+}
+
+/// Passes Ctrl-C on to readers.
+pub struct Cancel(Arc<AtomicBool>);
+
+impl Cancel {
+    pub fn new() -> Cancel {
+        Cancel(flag())
+    }
+
+    /// True once it was pressed.
+    pub fn is_set(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+impl Monitor for Cancel {
+    fn is_cancelled(&self) -> bool {
+        self.is_set()
+    }
+}
+
+/// A sign on standard error that work goes on; hidden where that is not a terminal.
+pub fn spinner(what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::new_spinner().with_message(what);
+    bar.enable_steady_tick(std::time::Duration::from_millis(100));
+    bar
 }
 
 /// A bar on standard error with `total` units; hidden where that is not a terminal.

@@ -33,8 +33,10 @@ enum Command {
     Validate(command::validate::Args),
     /// Build a scene's tree for the batch kernels and save both
     Build(command::build::Args),
-    /// Check a saved scene and say what it holds
+    /// Say what a saved scene, a scene or a mesh holds, and what may be wrong with it
     Info(command::info::Args),
+    /// Convert a mesh to another format: positions and faces
+    Convert(command::convert::Args),
     /// Measure rays per second of the batch kernels on a scene, saved or not
     Bench(command::bench::Args),
     /// Run the experiment of the 1997 paper and write its report
@@ -50,6 +52,7 @@ fn main() -> ExitCode {
         Command::Validate(args) => command::validate::run(&args),
         Command::Build(args) => command::build::run(&args),
         Command::Info(args) => command::info::run(&args),
+        Command::Convert(args) => command::convert::run(&args),
         Command::Bench(args) => command::bench::run(&args),
         Command::Paper(args) => paper::run(&args),
     };

@@ -304,7 +304,8 @@ fn a_file_that_is_no_saved_scene_is_refused_in_a_sentence() {
     assert!(refused(&["info", "no.rope"], 1).contains("cannot open no.rope: "));
     std::fs::write(folder.path().join("a.nff"), "v\n").unwrap();
     let sentence = refused(&["info", "a.nff"], 1);
-    assert!(sentence.contains("a.nff: no saved scene: at offset 0, "), "{sentence}");
+    assert!(sentence.contains("a.nff:2:1: expected the view's from"), "{sentence}");
+    assert!(refused(&["info", "a.nff", "--verify"], 2).contains("--verify is for saved scenes"));
     assert!(
         ropewalk(folder.path(), &["build", "spd:tetra:2", "--save", "a.rope"]).status.success()
     );
@@ -370,4 +371,98 @@ fn mesh_files_are_rendered_and_timed() {
         message.contains("cut.obj: line 2: expected a face of at least 3 corners"),
         "{message}"
     );
+}
+
+/// A cube without one side, of two materials, and a vertex of its own.
+const BOX: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 0.1\nv 9 9 9\n\
+    vn 0 0 1\nusemtl paint\nf 1//1 3 4 2\nf 1 2 6 5\nf 3 7 8 4\nusemtl other\nf 1 5 7 3\nf 2 4 8 6\n";
+
+#[test]
+fn meshes_are_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("a.obj"), BOX).unwrap();
+    std::fs::write(folder.path().join("a.mtl"), "newmtl paint\nKd 1 0 0\nmap_Kd ../a.png\n")
+        .unwrap();
+    let run = |args: &[&str]| {
+        let output = ropewalk(folder.path(), args);
+        assert!(output.status.success(), "{args:?}: {}", stderr(&output));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let json: Value = serde_json::from_str(&run(&["info", "a.obj", "--json"])).unwrap();
+    assert_eq!((&json["kind"], &json["format"]), (&"mesh".into(), &"OBJ".into()));
+    assert_eq!((&json["vertices"], &json["triangles"]), (&9.into(), &10.into()));
+    assert_eq!(json["bounds"][1], serde_json::json!([9.0, 9.0, 9.0]));
+    assert_eq!(json["materials"][1], serde_json::json!({"name": "other", "triangles": 4}));
+    assert_eq!((&json["closed"], &json["normals"]), (&false.into(), &true.into()));
+    let defects = &json["defects"];
+    assert_eq!((&defects["boundary_edges"], &defects["boundary_loops"]), (&4.into(), &1.into()));
+    assert_eq!((&defects["isolated_vertices"], &defects["turned_edges"]), (&1.into(), &0.into()));
+    let skipped = json["skipped"].to_string();
+    assert!(skipped.contains("texture ../a.png: expected a file in this folder"), "{skipped}");
+    assert!(skipped.contains("material other, which no library"), "{skipped}");
+    let text = run(&["info", "a.obj"]);
+    for part in
+        ["a mesh in OBJ", "not closed", "  not read              texture ../a.png", "paint "]
+    {
+        assert!(text.contains(part), "{text}");
+    }
+    let scene: Value = serde_json::from_str(&run(&["info", "spd:balls:1", "--json"])).unwrap();
+    assert_eq!((&scene["kind"], &scene["spheres"]), (&"scene".into(), &10.into()));
+    std::fs::write(folder.path().join("x"), "Dear reader").unwrap();
+    let output = ropewalk(folder.path(), &["info", "x"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        stderr(&output).contains("x: expected a scene in NFF or a mesh"),
+        "{}",
+        stderr(&output)
+    );
+    assert!(stderr(&output).contains("found text of an unknown kind"), "{}", stderr(&output));
+}
+
+#[test]
+fn meshes_are_converted_whole_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    std::fs::write(path("a.obj"), BOX).unwrap();
+    let run = |args: &[&str]| ropewalk(folder.path(), args);
+    for name in ["b.ply", "b.stl", "b.off", "b.glb", "b.obj"] {
+        let output = run(&["convert", "a.obj", name, "--json"]);
+        assert!(output.status.success(), "{name}: {}", stderr(&output));
+        let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(json["triangles"], 10);
+        let lost = json["lost"].to_string();
+        assert!(lost.contains("materials (2)") && lost.contains("normals"), "{lost}");
+        assert_eq!(lost.contains("beyond single precision"), name == "b.stl" || name == "b.glb");
+        assert_eq!(lost.contains("share vertices"), name == "b.stl");
+        let info = run(&["info", name, "--json"]);
+        let info: Value = serde_json::from_slice(&info.stdout).unwrap();
+        assert_eq!(
+            (&info["triangles"], &info["defects"]["boundary_edges"]),
+            (&10.into(), &4.into())
+        );
+    }
+    let text = stderr(&run(&["convert", "a.obj", "b.stl"]));
+    assert!(
+        text.contains("b.stl: 10 triangles, 584 bytes") && text.contains("lost: normals"),
+        "{text}"
+    );
+    let before = files(folder.path());
+    let refused = |args: &[&str], code: i32, part: &str| {
+        let output = run(args);
+        assert_eq!(output.status.code(), Some(code), "{args:?}");
+        assert!(stderr(&output).contains(part), "{}", stderr(&output));
+    };
+    std::fs::write(path("bad.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
+    std::fs::write(path("s.nff"), "s 0 0 0 1\n").unwrap();
+    refused(&["convert", "a.obj", "./a.obj"], 2, "the input itself is not overwritten");
+    refused(&["convert", "a.obj", "c.fbx"], 2, "expected a name that ends in .obj");
+    refused(&["convert", "a.obj", "c.obj.gz"], 2, "expected a name that ends in .obj");
+    refused(&["convert", "bad.obj", "c.ply"], 1, "bad.obj: line 2: expected a vertex from 1 to 1");
+    refused(&["convert", "s.nff", "c.ply"], 1, "found a scene in NFF");
+    refused(&["convert", "no.obj", "c.ply"], 1, "there is no such file");
+    refused(&["convert", "a.obj", "no/c.ply"], 1, "cannot write no/c.ply");
+    let after: Vec<String> =
+        files(folder.path()).into_iter().filter(|n| n != "bad.obj" && n != "s.nff").collect();
+    assert_eq!(after, before);
+    assert_eq!(std::fs::read_to_string(path("a.obj")).unwrap(), BOX);
 }

@@ -18,9 +18,11 @@ pub mod stage;
 mod watched;
 
 pub use file::write_atomically;
-pub use mesh::{Mesh, MeshError, MeshFormat, MeshLimits};
+pub use mesh::{Defects, Mesh, MeshError, MeshFormat, MeshLimits, MeshOutput, Recognised};
 pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, SceneSink, Surface};
 pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};
 pub use nff::{format_g, read_nff};
-pub use source::{Fault, Loaded, SceneError, load, load_monitored, load_scene, parse_builtin};
+pub use source::{
+    Fault, Loaded, SceneError, load, load_monitored, load_scene, parse_builtin, recognise,
+};
 pub use stage::Stage;

@@ -1,6 +1,8 @@
 //! Scenes by name: files, compressed or not, and built-in scenes.
 
-use crate::mesh::{Mesh, MeshError, MeshErrorKind, MeshFormat, MeshLimits};
+use crate::mesh::{
+    self, GZIP_MAGIC, Mesh, MeshError, MeshErrorKind, MeshFormat, MeshLimits, Recognised,
+};
 use crate::model::{Material, Object, Scene, Surface};
 use crate::nff::{NffError, NffLimits};
 use crate::spd::{self, Spd, SpdError};
@@ -8,13 +10,11 @@ use crate::watched;
 use flate2::bufread::MultiGzDecoder;
 use ropewalk::build::Monitor;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
 /// Prefix of built-in scenes: `spd:NAME[:SIZE]`.
 const BUILTIN_PREFIX: &str = "spd:";
-/// The first bytes of every gzip file (RFC 1952, section 2.3.1).
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 /// Read buffer in bytes: large enough that calls into the system do not show.
 const BUFFER_BYTES: usize = 64 * 1024;
 
@@ -41,6 +41,16 @@ pub enum SceneError {
     NotGzip {
         /// The file as the user named it.
         path: String,
+    },
+    /// The file is neither a scene nor a mesh, by its content and its name.
+    #[error(
+        "{path}: expected a scene in NFF or a mesh in OBJ, PLY, STL, OFF or glTF, found {found}"
+    )]
+    Unrecognised {
+        /// The file as the user named it.
+        path: String,
+        /// What it looks like.
+        found: &'static str,
     },
     /// The text is at fault.
     #[error(transparent)]
@@ -106,7 +116,7 @@ impl SceneError {
                 MeshErrorKind::Io(error) if !is_damaged_archive(error) => Fault::System,
                 _ => Fault::Input,
             },
-            SceneError::NotGzip { .. } => Fault::Input,
+            SceneError::NotGzip { .. } | SceneError::Unrecognised { .. } => Fault::Input,
             SceneError::Directory { .. }
             | SceneError::UnknownBuiltin { .. }
             | SceneError::BuiltinSize { .. }
@@ -159,8 +169,8 @@ impl Loaded {
     }
 }
 
-/// Loads a scene or a mesh: `spd:NAME[:SIZE]` is a built-in scene, a path whose name has the extension of a
-/// [`MeshFormat`] a mesh, any other path an NFF file. Files may be compressed by gzip whatever their names. A scene's
+/// Loads a scene or a mesh: `spd:NAME[:SIZE]` is a built-in scene, anything else a file, whose format is told by its content, then
+/// by its name. Files may be compressed by gzip whatever their names. A scene's
 /// name becomes the file's name without its extensions, or `spd:NAME:SIZE`.
 ///
 /// # Errors
@@ -181,9 +191,12 @@ pub fn load_monitored(
     if let Some((spd, size)) = parse_builtin(spec)? {
         return load_builtin(spec, spd, size, limits).map(Loaded::Scene);
     }
-    match MeshFormat::of_name(Path::new(spec)) {
-        Some(format) => load_mesh(spec, format, monitor),
-        None => load_file(spec, limits, monitor).map(Loaded::Scene),
+    match recognise(spec)? {
+        Recognised::Mesh(_) => load_mesh(spec, monitor),
+        Recognised::Nff => load_file(spec, limits, monitor).map(Loaded::Scene),
+        Recognised::Neither(found) => {
+            Err(SceneError::Unrecognised { path: spec.to_owned(), found })
+        }
     }
 }
 
@@ -195,22 +208,39 @@ pub fn load_scene(spec: &str, limits: &NffLimits) -> Result<Scene, SceneError> {
     load(spec, limits).map(Loaded::into_scene)
 }
 
-fn load_mesh(spec: &str, format: MeshFormat, monitor: &dyn Monitor) -> Result<Loaded, SceneError> {
+/// What a file is, by its first bytes after unpacking, its size and its name.
+///
+/// # Errors
+/// Of opening it and reading these, and [`SceneError::NotGzip`].
+pub fn recognise(spec: &str) -> Result<Recognised, SceneError> {
     let path = Path::new(spec);
+    let cannot_open = |source| SceneError::Open { path: spec.to_owned(), source };
     if path.is_dir() {
         return Err(SceneError::Directory { path: spec.to_owned() });
     }
-    let cannot_open = |source| SceneError::Open { path: spec.to_owned(), source };
-    let file = File::open(path).map_err(cannot_open)?;
-    let cancelled = |error| SceneError::Mesh(MeshError::from(error).in_file(spec));
-    let bytes = watched::read_file(file, monitor).map_err(cannot_open)?.map_err(cancelled)?;
-    let named_gzip = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
-    if named_gzip && !bytes.starts_with(&GZIP_MAGIC) {
+    let mut file = File::open(path).map_err(cannot_open)?;
+    let data = file.metadata().map_err(cannot_open)?;
+    if !data.is_file() {
+        // What is no regular file may be read only once.
+        return Ok(mesh::recognise(path, b"v\n", None));
+    }
+    let (mut head, mut size) = (Vec::new(), Some(data.len()));
+    (&mut file).take(mesh::HEAD as u64).read_to_end(&mut head).map_err(cannot_open)?;
+    if head.starts_with(&GZIP_MAGIC) {
+        let mut plain = Vec::new();
+        // A damaged archive is found out by those who read all of it.
+        let _ = MultiGzDecoder::new(&head[..]).take(mesh::HEAD as u64).read_to_end(&mut plain);
+        (head, size) = (plain, None);
+    } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
         return Err(SceneError::NotGzip { path: spec.to_owned() });
     }
-    let limits = &MeshLimits::DEFAULT;
-    let mesh = Mesh::parse_monitored(format, &bytes, path.parent(), limits, monitor);
-    Ok(Loaded::Mesh(stem(path), mesh.map_err(|error| error.in_file(spec))?))
+    Ok(mesh::recognise(path, &head, size))
+}
+
+fn load_mesh(spec: &str, monitor: &dyn Monitor) -> Result<Loaded, SceneError> {
+    let path = Path::new(spec);
+    let mesh = Mesh::read_monitored(path, &MeshLimits::DEFAULT, monitor)?;
+    Ok(Loaded::Mesh(stem(path), mesh))
 }
 
 /// The database and size that `spd:NAME[:SIZE]` names, the standard size if none is given; `None`

@@ -3,7 +3,7 @@
 //! Quantities are those of glTF 2.0 (metallic-roughness materials, punctual lights); other formats are translated.
 //! Colours are linear Rec. 709 unless they lie in an [`Image`]. Placements are worked into the vertices.
 
-use crate::mesh::{Mesh, MeshError, MeshLimits};
+use crate::mesh::{self, Mesh, MeshError, MeshFormat, MeshLimits};
 use crate::model::Camera;
 use crate::source::stem;
 use ropewalk::build::Monitor;
@@ -43,17 +43,31 @@ impl Stage {
         Stage { name, mesh, materials: vec![Material::default()], ..Stage::default() }
     }
 
-    /// Reads a mesh file with what it says about looks, until the monitor cancels it. As yet only positions and
-    /// faces are read.
+    /// Reads a mesh file with what it says about looks, until the monitor cancels it. Materials and images that lie beside the
+    /// file are read from its folder or below and nowhere else; those that cannot be had are left out, with a sentence
+    /// in [`Stage::skipped`]. The mesh is that of [`Mesh::read_monitored`].
     ///
     /// # Errors
-    /// Those of [`Mesh::read_monitored`].
+    /// Those of [`Mesh::read_monitored`], and of materials that are no materials of glTF.
     pub fn read_monitored(
         path: &Path,
         limits: &MeshLimits,
         monitor: &dyn Monitor,
     ) -> Result<Stage, MeshError> {
-        Ok(Stage::of_mesh(stem(path), Mesh::read_monitored(path, limits, monitor)?))
+        Ok(Stage { name: stem(path), ..mesh::read_file(path, true, limits, monitor)? })
+    }
+
+    /// The same from memory. `folder` is where the files lie that it names; without it there are none.
+    ///
+    /// # Errors
+    /// Those of [`Mesh::parse`]; the file is called `input`.
+    pub fn parse(
+        format: MeshFormat,
+        bytes: &[u8],
+        folder: Option<&Path>,
+        limits: &MeshLimits,
+    ) -> Result<Stage, MeshError> {
+        mesh::read_bytes(format, bytes, folder, true, limits, &())
     }
 }
 

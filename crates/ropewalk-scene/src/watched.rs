@@ -1,7 +1,6 @@
 //! Reading that a monitor can cancel.
 
 use ropewalk::build::Monitor;
-use std::fs::File;
 use std::io::{self, BufRead, Read};
 
 /// The monitor cancelled it.
@@ -10,14 +9,6 @@ pub struct Cancelled;
 
 /// Bytes that are read before the monitor is asked: some milliseconds, also if they are unpacked.
 const PIECE: u64 = 1 << 22;
-
-/// Reads a whole file, until the monitor cancels it.
-pub fn read_file(file: File, monitor: &dyn Monitor) -> io::Result<Result<Vec<u8>, Cancelled>> {
-    let mut bytes = Vec::new();
-    let len = file.metadata().map_or(0, |metadata| metadata.len());
-    bytes.try_reserve_exact(usize::try_from(len).unwrap_or(0))?;
-    Ok(read_to_end(file, &mut bytes, monitor)?.map(|()| bytes))
-}
 
 /// Reads all that is left, until the monitor cancels it.
 pub fn read_to_end(

@@ -460,7 +460,8 @@ fn buffers_beside_the_file_and_nowhere_else() {
 
 #[test]
 fn limits_hold() {
-    let small = MeshLimits { bytes: 10_000, vertices: 3, faces: 3, corners: 4 };
+    let small =
+        MeshLimits { bytes: 10_000, vertices: 3, faces: 3, corners: 4, images: 2, pixels: 100 };
     let refused = |text: &str, limits: MeshLimits| {
         Mesh::parse(MeshFormat::Obj, text.as_bytes(), None, &limits).unwrap_err().to_string()
     };
@@ -482,19 +483,19 @@ fn damaged_files_are_read_or_refused() {
     let mut state = 1u64;
     for (format, bytes) in all() {
         for end in 0..bytes.len() {
-            property::reads_or_refuses(format, &bytes[..end]);
+            property::reads_or_refuses(format, &bytes[..end], None);
         }
         for at in 0..bytes.len() {
             state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             for byte in [0, 0xff, b'-', b'9', b'\n', (state >> 56) as u8] {
                 let mut damaged = bytes.clone();
                 damaged[at] = byte;
-                property::reads_or_refuses(format, &damaged);
+                property::reads_or_refuses(format, &damaged, None);
             }
         }
         // As every other format.
         for other in MeshFormat::ALL {
-            property::reads_or_refuses(other, &bytes);
+            property::reads_or_refuses(other, &bytes, None);
         }
     }
 }
@@ -521,21 +522,29 @@ fn meshes_are_scenes_too() {
     assert_eq!(error.fault(), ropewalk_scene::Fault::Input);
 }
 
-/// The fuzzer's seeds, whole and cut off; the first byte of each chooses the format.
+/// The fuzzer's seeds, whole and cut off.
 #[test]
 fn the_fuzz_corpus_holds() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus-seed/mesh");
-    let mut count = 0;
-    for entry in std::fs::read_dir(&folder).unwrap() {
-        let path = entry.unwrap().path();
-        let bytes = std::fs::read(&path).unwrap();
-        let (&first, rest) = bytes.split_first().unwrap();
-        let format = MeshFormat::ALL[usize::from(first) % MeshFormat::ALL.len()];
-        assert!(property::reads_or_refuses(format, rest), "{}", path.display());
-        for end in 0..rest.len() {
-            property::reads_or_refuses(format, &rest[..end]);
+    use MeshFormat::{Gltf, Obj, Off, Ply, Stl};
+    let seeds = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus-seed");
+    let folder = tempfile::tempdir().unwrap();
+    for (name, format, least) in
+        [("obj", Obj, 2), ("ply", Ply, 4), ("stl", Stl, 2), ("off", Off, 2), ("gltf", Gltf, 3)]
+    {
+        let mut count = 0;
+        for entry in std::fs::read_dir(seeds.join(name)).unwrap() {
+            let path = entry.unwrap().path();
+            let bytes = std::fs::read(&path).unwrap();
+            let holds = |bytes: &[u8]| match format {
+                Obj => property::reads_or_refuses_with_library(bytes, folder.path()),
+                _ => property::reads_or_refuses(format, bytes, None),
+            };
+            assert!(holds(&bytes), "{}", path.display());
+            for end in 0..bytes.len() {
+                holds(&bytes[..end]);
+            }
+            count += 1;
         }
-        count += 1;
+        assert!(count >= least, "{name}");
     }
-    assert!(count >= 8);
 }

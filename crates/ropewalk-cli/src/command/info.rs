@@ -1,6 +1,6 @@
 //! `ropewalk info FILE`
 
-use crate::output::{print_json, thousands};
+use crate::output::{print_json, thousands, usage};
 use crate::saved;
 use ropewalk::file::{
     AnyOpened, FORMAT_VERSION, LAYOUT_VERSION, Opened, SHAPES_LAYOUT_VERSION, Tag, short,
@@ -12,9 +12,10 @@ use std::time::Instant;
 /// Arguments of `info`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A saved scene, from `ropewalk build --save` or `Scene.save` in Python
+    /// A saved scene, from `ropewalk build --save` or `Scene.save` in Python; a mesh in OBJ, PLY, STL, OFF or glTF; a
+    /// scene in NFF
     file: String,
-    /// Check all checksums as well
+    /// Of a saved scene, check all checksums as well
     #[arg(long)]
     verify: bool,
     /// One JSON object on standard output
@@ -97,6 +98,14 @@ fn meaning(tag: Tag) -> &'static str {
 
 /// Opens, checks and prints.
 pub fn run(args: &Args) -> anyhow::Result<()> {
+    // What is not there is said by those who open saved scenes.
+    let is_other = args.file.starts_with("spd:") || std::path::Path::new(&args.file).exists();
+    if is_other && !saved::is_saved(&args.file) {
+        if args.verify {
+            return Err(usage(format!("{}: --verify is for saved scenes", args.file)));
+        }
+        return super::mesh_info::run(&args.file, args.json);
+    }
     let start = Instant::now();
     let scene = saved::open_any(&args.file, args.verify)?;
     let seconds = start.elapsed().as_secs_f64();

@@ -2,7 +2,9 @@
 
 pub mod bench;
 pub mod build;
+pub mod convert;
 pub mod info;
+mod mesh_info;
 pub mod render;
 pub mod scene;
 pub mod stats;

@@ -103,7 +103,7 @@ pub(super) fn wrong(
 }
 
 /// Shortened, with control characters escaped.
-fn printable(text: &str, most: usize) -> String {
+pub(super) fn printable(text: &str, most: usize) -> String {
     let mut out = String::new();
     for c in text.chars().take(most) {
         if c.is_control() {

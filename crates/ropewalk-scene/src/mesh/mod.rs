@@ -1,29 +1,44 @@
 //! Triangle meshes from files: OBJ, PLY, STL, OFF and glTF 2.0, plain or gzipped.
 //!
-//! Positions and faces are read, nothing else. Whatever a file announces is checked against its size
-//! before memory is taken for it, and every error says where it is and what was expected there.
+//! [`Mesh`] reads positions and faces, [`Stage`](crate::Stage) what a file says of looks too. Whatever a file announces is
+//! checked against its size before memory is taken for it, and every error says where it is and what was expected there.
+//! Large binary files are read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong.
 
+mod beside;
+mod defects;
 mod error;
+mod format;
 mod gltf;
+mod input;
+mod mtl;
 mod obj;
 mod off;
+mod picture;
 mod ply;
 mod polygon;
+mod skipped;
+mod soup;
 mod stl;
 mod text;
+mod write;
 
+pub use defects::Defects;
 pub use error::{MeshError, MeshErrorKind, Place};
+pub(crate) use format::{HEAD, recognise};
+pub use format::{MeshFormat, Recognised};
+pub(crate) use input::GZIP_MAGIC;
+pub use write::MeshOutput;
 
-use crate::watched::{self, Cancelled};
-use error::{Result, wrong};
-use flate2::bufread::MultiGzDecoder;
+use crate::stage::{Material, Stage};
+use crate::watched::Cancelled;
+use beside::Beside;
+use error::Result;
+use input::Input;
 use ropewalk::build::Monitor;
+use soup::Soup;
 use std::fs::File;
 use std::ops::Deref;
 use std::path::Path;
-
-/// The first bytes of every gzip file.
-const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 
 /// An indexed triangle mesh. Every face names existing vertices and every vertex is finite, also once rounded to
 /// `f32`; faces without area are kept.
@@ -38,7 +53,7 @@ pub struct Mesh {
 /// What a reader accepts before it gives up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshLimits {
-    /// Bytes of the file after decompression, its external buffers included.
+    /// Bytes of the file after decompression; as many again of the files that it names, together.
     pub bytes: u64,
     /// Vertices.
     pub vertices: usize,
@@ -46,15 +61,21 @@ pub struct MeshLimits {
     pub faces: usize,
     /// Corners of one polygon.
     pub corners: usize,
+    /// Images of textures.
+    pub images: usize,
+    /// Pixels of all images together.
+    pub pixels: u64,
 }
 
 impl MeshLimits {
-    /// 8 GiB, 500 million vertices and as many triangles, a million corners.
+    /// 8 GiB, 500 million vertices and as many triangles, a million corners, 1,024 images of 2^28 pixels (1 GiB).
     pub const DEFAULT: MeshLimits = MeshLimits {
         bytes: 8 << 30,
         vertices: 500_000_000,
         faces: 500_000_000,
         corners: 1_000_000,
+        images: 1024,
+        pixels: 1 << 28,
     };
 }
 
@@ -64,46 +85,8 @@ impl Default for MeshLimits {
     }
 }
 
-/// A file format.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MeshFormat {
-    /// Wavefront OBJ.
-    Obj,
-    /// PLY, ascii or binary of either byte order.
-    Ply,
-    /// STL, ascii or binary.
-    Stl,
-    /// Object File Format, ascii.
-    Off,
-    /// glTF 2.0, as text or binary (GLB).
-    Gltf,
-}
-
-impl MeshFormat {
-    /// All formats.
-    pub const ALL: [MeshFormat; 5] =
-        [MeshFormat::Obj, MeshFormat::Ply, MeshFormat::Stl, MeshFormat::Off, MeshFormat::Gltf];
-
-    /// The format that a file's name stands for, `.gz` aside.
-    pub fn of_name(path: &Path) -> Option<MeshFormat> {
-        let extension = |path: &Path| Some(path.extension()?.to_str()?.to_ascii_lowercase());
-        let mut found = extension(path)?;
-        if found == "gz" {
-            found = extension(Path::new(path.file_stem()?))?;
-        }
-        Some(match found.as_str() {
-            "obj" => MeshFormat::Obj,
-            "ply" => MeshFormat::Ply,
-            "stl" => MeshFormat::Stl,
-            "off" => MeshFormat::Off,
-            "gltf" | "glb" => MeshFormat::Gltf,
-            _ => return None,
-        })
-    }
-}
-
 impl Mesh {
-    /// Reads a mesh file; gzip is recognised by its magic, the format by the name.
+    /// Reads a mesh file; gzip is recognised by its magic, the format by the content, then by the name.
     ///
     /// Polygons with more than three corners become triangles in the order of their corners: convex ones and
     /// quadrilaterals by diagonals from one corner, others by cutting off ears. Meshes, groups and nodes of a file
@@ -120,19 +103,7 @@ impl Mesh {
     /// # Errors
     /// As [`Mesh::read`], and [`MeshErrorKind::Cancelled`].
     pub fn read_monitored(path: &Path, limits: &MeshLimits, monitor: &dyn Monitor) -> Result<Mesh> {
-        let name = path.display().to_string();
-        let read = || {
-            let format = MeshFormat::of_name(path).ok_or_else(|| {
-                wrong(
-                    Place::Start,
-                    "a name that ends in .obj, .ply, .stl, .off, .gltf or .glb",
-                    "none",
-                )
-            })?;
-            let bytes = watched::read_file(File::open(path)?, monitor)??;
-            Mesh::parse_monitored(format, &bytes, path.parent(), limits, monitor)
-        };
-        read().map_err(|error| error.in_file(name))
+        Ok(read_file(path, false, limits, monitor)?.mesh)
     }
 
     /// The same from memory. `folder` is where buffers of glTF files lie; without it there are none.
@@ -159,29 +130,82 @@ impl Mesh {
         limits: &MeshLimits,
         monitor: &dyn Monitor,
     ) -> Result<Mesh> {
-        let limits = &Watched { limits, monitor };
-        let mut plain = Vec::new();
-        let bytes = if bytes.starts_with(&GZIP_MAGIC) {
-            let limit = limits.bytes.saturating_add(1);
-            let decoder = std::io::Read::take(MultiGzDecoder::new(bytes), limit);
-            watched::read_to_end(decoder, &mut plain, monitor)??;
-            &plain[..]
-        } else {
-            bytes
-        };
-        if bytes.len() as u64 > limits.bytes {
-            let found = format!("{} or more", bytes.len());
-            return Err(wrong(Place::Start, format!("at most {} bytes", limits.bytes), found));
-        }
-        let soup = match format {
-            MeshFormat::Obj => obj::parse(bytes, limits),
-            MeshFormat::Ply => ply::parse(bytes, limits),
-            MeshFormat::Stl => stl::parse(bytes, limits),
-            MeshFormat::Off => off::parse(bytes, limits),
-            MeshFormat::Gltf => gltf::parse(bytes, folder, limits),
-        }?;
-        soup.mesh(limits)
+        Ok(read_bytes(format, bytes, folder, false, limits, monitor)?.mesh)
     }
+}
+
+/// Reads a file, with looks or without.
+pub(crate) fn read_file(
+    path: &Path,
+    with_looks: bool,
+    limits: &MeshLimits,
+    monitor: &dyn Monitor,
+) -> Result<Stage> {
+    let watched = Watched { limits, monitor };
+    let read = || {
+        let mut input = Input::of_file(File::open(path)?, &watched)?;
+        let size = input.size();
+        let format = match recognise(path, input.ahead(HEAD)?, size) {
+            Recognised::Mesh(format) => format,
+            Recognised::Nff => return Err(format::not_a_mesh("a scene in NFF")),
+            Recognised::Neither(what) => return Err(format::not_a_mesh(what)),
+        };
+        read_input(format, input, path.parent(), with_looks, &watched)
+    };
+    read().map_err(|error: MeshError| error.in_file(path.display().to_string()))
+}
+
+/// Reads bytes, with looks or without.
+pub(crate) fn read_bytes(
+    format: MeshFormat,
+    bytes: &[u8],
+    folder: Option<&Path>,
+    with_looks: bool,
+    limits: &MeshLimits,
+    monitor: &dyn Monitor,
+) -> Result<Stage> {
+    let watched = Watched { limits, monitor };
+    read_input(format, Input::of_bytes(bytes, &watched)?, folder, with_looks, &watched)
+}
+
+fn read_input(
+    format: MeshFormat,
+    input: Input<'_>,
+    folder: Option<&Path>,
+    with_looks: bool,
+    limits: &Watched<'_>,
+) -> Result<Stage> {
+    let soup = Soup::new(with_looks);
+    let beside = Beside::new(folder, limits.bytes);
+    let finished = |soup: Soup| match with_looks {
+        true => soup.stage(limits),
+        false => Ok(Stage { mesh: soup.mesh(limits)?, ..Stage::default() }),
+    };
+    let mut stage = match format {
+        MeshFormat::Obj => {
+            let (soup, named) = obj::parse(&input.rest()?, soup, limits)?;
+            let mut stage = finished(soup)?;
+            if with_looks {
+                mtl::dress(&mut stage, &named, &beside, limits)?;
+            }
+            stage
+        }
+        MeshFormat::Ply => {
+            let (soup, texture) = ply::parse(input, soup, limits)?;
+            let mut stage = finished(soup)?;
+            if let Some(name) = texture.filter(|_| !stage.uvs.is_empty()) {
+                ply::dress(&mut stage, &name, &beside, limits)?;
+            }
+            stage
+        }
+        MeshFormat::Stl => finished(stl::parse(input, soup, limits)?)?,
+        MeshFormat::Off => finished(off::parse(&input.rest()?, soup, limits)?)?,
+        MeshFormat::Gltf => gltf::parse(&input.rest()?, soup, &beside, limits)?,
+    };
+    if stage.materials.is_empty() {
+        stage.materials.push(Material::default());
+    }
+    Ok(stage)
 }
 
 /// Limits, and who may cancel the reading.
@@ -207,76 +231,5 @@ impl Watched<'_> {
     fn at(&self, number: usize) -> std::result::Result<(), Cancelled> {
         let asks = number.is_multiple_of(ASKED_EVERY);
         if asks && self.monitor.is_cancelled() { Err(Cancelled) } else { Ok(()) }
-    }
-}
-
-/// Vertices and polygons as a file states them.
-#[derive(Default)]
-struct Soup {
-    vertices: Vec<[f64; 3]>,
-    /// Corners of all polygons, one after the other.
-    corners: Vec<u32>,
-    /// Where each polygon ends in them.
-    ends: Vec<usize>,
-}
-
-impl Soup {
-    /// Adds a vertex, which must be finite.
-    fn vertex(&mut self, place: Place, point: [f64; 3], limits: &Watched<'_>) -> Result<()> {
-        limits.at(self.vertices.len())?;
-        if let Some(x) = point.iter().find(|&&x| !(x as f32).is_finite()) {
-            let count = self.vertices.len();
-            let what = format!("a finite coordinate within f32 for vertex {count}");
-            return Err(wrong(place, what, x));
-        }
-        if self.vertices.len() >= limits.vertices {
-            return Err(wrong(place, format!("at most {} vertices", limits.vertices), "more"));
-        }
-        self.vertices.push(point);
-        Ok(())
-    }
-
-    /// Ends the polygon whose corners were pushed since the last one.
-    fn end_polygon(&mut self, place: Place, limits: &Watched<'_>) -> Result<()> {
-        limits.at(self.ends.len())?;
-        let count = self.corners.len() - self.ends.last().copied().unwrap_or(0);
-        if count < 3 {
-            return Err(wrong(place, "a face of at least 3 corners", count));
-        }
-        if count > limits.corners {
-            return Err(wrong(
-                place,
-                format!("a face of at most {} corners", limits.corners),
-                count,
-            ));
-        }
-        self.ends.push(self.corners.len());
-        if self.corners.len() - 2 * self.ends.len() > limits.faces {
-            return Err(wrong(place, format!("at most {} triangles", limits.faces), "more"));
-        }
-        Ok(())
-    }
-
-    /// Cuts polygons into triangles. Corners must name vertices.
-    fn mesh(self, limits: &Watched<'_>) -> Result<Mesh> {
-        let Soup { vertices, corners, ends } = self;
-        if ends.is_empty() {
-            return Err(wrong(Place::End, "at least one face", "none"));
-        }
-        let triangles = corners.len() - 2 * ends.len();
-        debug_assert!(triangles <= limits.faces);
-        let (mut faces, mut start) = (Vec::with_capacity(triangles), 0);
-        for (index, end) in ends.into_iter().enumerate() {
-            limits.at(index)?;
-            match &corners[start..end] {
-                &[a, b, c] => faces.push([a, b, c]),
-                polygon => polygon::cut(&vertices, polygon, &mut faces).map_err(|most| {
-                    let what = format!("a polygon that is convex or has at most {most} corners");
-                    wrong(Place::Part(format!("face {index}")), what, polygon.len())
-                })?,
-            }
-            start = end;
-        }
-        Ok(Mesh { vertices, faces })
     }
 }

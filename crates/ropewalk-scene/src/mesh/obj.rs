@@ -1,12 +1,27 @@
-//! Wavefront OBJ: `v` and `f`, everything else is passed over.
+//! Wavefront OBJ: vertices with colours, faces, texture coordinates, normals and materials; other statements are
+//! passed over.
 
-use super::error::{Result, wrong};
+use super::Watched;
+use super::error::{Place, Result, wrong};
+use super::soup::{NONE, Soup, linear};
 use super::text::{Words, parse as number, quote};
-use super::{Soup, Watched};
+use std::collections::HashMap;
 
-/// Vertices and faces. Colours and weights behind positions are ignored, as are texture and normal indices;
-/// negative indices count back from the last vertex so far.
-pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
+/// What an OBJ file names besides its faces.
+#[derive(Default)]
+pub struct Named {
+    /// What stands behind each `mtllib`.
+    pub libraries: Vec<String>,
+    /// Materials in the order of their first use; faces name them by their place here. An empty name is that of faces before
+    /// any `usemtl`.
+    pub materials: Vec<String>,
+    /// Their places by name.
+    places: HashMap<String, u32>,
+}
+
+/// Vertices and faces; negative indices count back from the last vertex so far. Without looks, texture and normal
+/// indices are not even read.
+pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<(Soup, Named)> {
     // A backslash at the end of a line goes on with the next one.
     let joined: Vec<u8>;
     let is_joined =
@@ -17,59 +32,179 @@ pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
     } else {
         bytes
     };
-    let (mut soup, mut words) = (Soup::default(), Words::new(bytes, 1, Some(b'#')));
+    let mut words = Words::new(bytes, 1, Some(b'#'));
+    let (mut named, mut smooths) = (Named::default(), false);
     // The largest index, and where it stands: vertices may come later.
-    let mut largest = (0, words.place());
+    let mut largest = (0, 0);
     while let Some(word) = words.next() {
-        let place = words.place();
+        let line = words.line();
+        let place = || Place::Line(line);
         match word {
             b"v" => {
-                let mut coordinate = |what| number(words.next_on_line(), what, &place);
+                let mut coordinate = |what| number(words.next_on_line(), what, &place());
                 let point = [
                     coordinate("x of a vertex")?,
                     coordinate("y of a vertex")?,
                     coordinate("z of a vertex")?,
                 ];
                 soup.vertex(place, point, limits)?;
+                if soup.looks.is_some() {
+                    read_color(&mut words, &mut soup);
+                }
             }
             b"f" => {
+                if soup.looks.is_some() {
+                    use_material(&mut soup, &mut named, None);
+                }
                 while let Some(corner) = words.next_on_line() {
-                    let first = corner.split(|&b| b == b'/').next();
-                    let index: i64 = number(first, "a vertex", &place)?;
+                    let mut parts = corner.split(|&b| b == b'/');
+                    let index: i64 = number(parts.next(), "a vertex", &place())?;
                     let count = soup.vertices.len() as i64;
                     let index = match index {
-                        0 => return Err(wrong(place, "a vertex from 1 on, or from -1 down", "0")),
+                        0 => {
+                            return Err(wrong(place(), "a vertex from 1 on, or from -1 down", "0"));
+                        }
                         i if i > 0 => i - 1,
                         i if i.checked_add(count).is_some_and(|i| i >= 0) => i + count,
-                        i => return Err(wrong(place, format!("a vertex from -{count} on"), i)),
+                        i => return Err(wrong(place(), format!("a vertex from -{count} on"), i)),
                     };
-                    if index >= limits.vertices.min(u32::MAX as usize) as i64 {
-                        return Err(wrong(
-                            place,
-                            format!("at most {} vertices", limits.vertices),
-                            quote(corner),
-                        ));
+                    if index >= limits.vertices.min(NONE as usize) as i64 {
+                        let what = format!("at most {} vertices", limits.vertices);
+                        return Err(wrong(place(), what, quote(corner)));
                     }
                     if index >= largest.0 {
-                        largest = (index, place.clone());
+                        largest = (index, line);
                     }
-                    soup.corners.push(index as u32);
+                    soup.open.push(index as u32);
+                    if let Some(looks) = &mut soup.looks {
+                        let counts = [looks.uvs.len(), looks.normals.len()];
+                        looks.open.push(counts.map(|count| reference(parts.next(), count)));
+                    }
                 }
                 soup.end_polygon(place, limits)?;
             }
             // Text files have no other control characters; so is a binary file found out.
             _ if word.iter().any(|b| b.is_ascii_control()) => {
-                return Err(wrong(place, "text", quote(word)));
+                return Err(wrong(place(), "text", quote(word)));
+            }
+            _ if soup.looks.is_none() => {}
+            b"vt" | b"vn" => read_row(&mut words, word == b"vt", &mut soup, &place(), limits)?,
+            b"usemtl" => {
+                let name = rest(&mut words);
+                use_material(&mut soup, &mut named, Some(name));
+            }
+            b"mtllib" if named.libraries.len() < 1000 => named.libraries.push(rest(&mut words)),
+            b"s" => {
+                let group = words.next_on_line().unwrap_or_default();
+                smooths |= !matches!(group, b"off" | b"0" | b"");
+            }
+            b"l" | b"p" => soup.skip(format!("{} elements", String::from_utf8_lossy(word))),
+            b"curv" | b"curv2" | b"surf" | b"vp" | b"bzp" | b"bsp" => {
+                soup.skip("curves and free-form surfaces");
             }
             _ => {}
         }
         words.skip_line();
     }
-    if !soup.ends.is_empty() && largest.0 >= soup.vertices.len() as i64 {
+    if soup.faces() > 0 && largest.0 >= soup.vertices.len() as i64 {
         let what = format!("a vertex from 1 to {}", soup.vertices.len());
-        return Err(wrong(largest.1, what, largest.0 + 1));
+        return Err(wrong(Place::Line(largest.1), what, largest.0 + 1));
     }
-    Ok(soup)
+    if smooths && soup.looks.as_ref().is_some_and(|looks| looks.normals.is_empty()) {
+        soup.skip("smoothing groups, since the file has no normals");
+    }
+    Ok((soup, named))
+}
+
+/// The material of faces that follow: one by name, or the nameless one if there is none yet.
+fn use_material(soup: &mut Soup, named: &mut Named, name: Option<String>) {
+    let Some(looks) = &mut soup.looks else {
+        return;
+    };
+    let name = match name {
+        Some(name) => name,
+        None if named.materials.is_empty() => String::new(),
+        None => return,
+    };
+    looks.material = *named.places.entry(name).or_insert_with_key(|name| {
+        named.materials.push(name.clone());
+        named.materials.len() as u32 - 1
+    });
+}
+
+/// The colour behind a position, in sRGB; a single number there is a weight.
+fn read_color(words: &mut Words<'_>, soup: &mut Soup) {
+    let mut next = || -> Option<f32> { number(words.next_on_line(), "", &Place::Start).ok() };
+    let (Some(r), Some(g), Some(b)) = (next(), next(), next()) else {
+        return;
+    };
+    let Some(looks) = &mut soup.looks else {
+        return;
+    };
+    if [r, g, b].iter().any(|x| !x.is_finite()) {
+        looks.skipped.note("colours of vertices that are not numbers");
+        return;
+    }
+    looks.colors.resize(soup.vertices.len() - 1, [1.0; 3]);
+    looks.colors.push([r, g, b].map(linear));
+}
+
+/// Texture coordinates, with v counted from the top, or a normal.
+fn read_row(
+    words: &mut Words<'_>,
+    is_uv: bool,
+    soup: &mut Soup,
+    place: &Place,
+    limits: &Watched<'_>,
+) -> Result<()> {
+    let Some(looks) = &mut soup.looks else {
+        return Ok(());
+    };
+    let what = if is_uv { "texture coordinates" } else { "a normal" };
+    let count = if is_uv { looks.uvs.len() } else { looks.normals.len() };
+    if count >= 3 * limits.faces.max(limits.vertices).min(u32::MAX as usize / 3) {
+        return Err(wrong(place.clone(), format!("at most {count} of these"), what));
+    }
+    // Those that are no numbers count as absent: what counts is that the mesh opens.
+    let mut next = |absent: f32| match words.next_on_line() {
+        None => absent,
+        word => number::<f32>(word, "", place).ok().filter(|x| x.is_finite()).unwrap_or(f32::NAN),
+    };
+    let row = [
+        next(f32::NAN),
+        next(if is_uv { 0.0 } else { f32::NAN }),
+        if is_uv { 0.0 } else { next(f32::NAN) },
+    ];
+    let is_sound = row.iter().all(|x| x.is_finite());
+    if !is_sound {
+        looks.skipped.note(format!("{what} that are not numbers"));
+    }
+    let row = if is_sound { row } else { [0.0; 3] };
+    if is_uv {
+        looks.uvs.push([row[0], 1.0 - row[1]]);
+    } else {
+        looks.normals.push(row);
+    }
+    Ok(())
+}
+
+/// The index of a texture coordinate or a normal; what is no index names none.
+fn reference(text: Option<&[u8]>, count: usize) -> u32 {
+    let text = text.filter(|text| !text.is_empty());
+    let Ok(index) = number::<i64>(text, "", &Place::Start) else {
+        return NONE;
+    };
+    let index = if index > 0 { index - 1 } else { index.saturating_add(count as i64) };
+    match index {
+        // 0 counts as the one behind the last and is counted as absent, as is whatever lies below.
+        0.. => u32::try_from(index).unwrap_or(NONE - 1),
+        _ => NONE - 1,
+    }
+}
+
+/// The rest of a line, trimmed.
+fn rest(words: &mut Words<'_>) -> String {
+    String::from_utf8_lossy(words.rest_of_line().trim_ascii()).into_owned()
 }
 
 /// The text with line ends behind a backslash moved to the end of the logical line, so that line numbers

@@ -1,11 +1,12 @@
 //! OFF, ascii; also COFF, NOFF, STOFF and their like, of which positions are read.
 
+use super::Watched;
 use super::error::{Place, Result, wrong};
+use super::soup::Soup;
 use super::text::{Words, quote};
-use super::{Soup, Watched};
 
 /// Vertices and faces.
-pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
+pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<Soup> {
     let mut words = Words::new(bytes, 1, Some(b'#'));
     let head = words.next().unwrap_or_default();
     let is_known = matches!(
@@ -29,11 +30,14 @@ pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
         let what = format!("{vertices} vertices and {faces} faces");
         return Err(wrong(place, what, format!("{} bytes of text", words.left())));
     }
-    let mut soup = Soup::default();
+    if head != b"OFF" {
+        soup.skip("colours, normals and texture coordinates of OFF vertices");
+    }
+    soup.reserve(vertices as usize, faces as usize, limits);
     for _ in 0..vertices {
         let x = words.number("x of a vertex")?;
         let (y, z) = (words.number("y of a vertex")?, words.number("z of a vertex")?);
-        soup.vertex(words.place(), [x, y, z], limits)?;
+        soup.vertex(|| words.place(), [x, y, z], limits)?;
         words.skip_line();
     }
     for _ in 0..faces {
@@ -50,12 +54,14 @@ pub fn parse(bytes: &[u8], limits: &Watched<'_>) -> Result<Soup> {
             if index >= vertices {
                 return Err(out_of_range(words.place(), vertices, index));
             }
-            soup.corners.push(index as u32);
+            soup.open.push(index as u32);
         }
         let place = words.place();
-        // Colours.
+        if words.next_on_line().is_some() {
+            soup.skip("colours of OFF faces");
+        }
         words.skip_line();
-        soup.end_polygon(place, limits)?;
+        soup.end_polygon(|| place, limits)?;
     }
     Ok(soup)
 }

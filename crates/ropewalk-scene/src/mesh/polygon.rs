@@ -5,11 +5,16 @@ const MOST: usize = 1024;
 
 /// Cuts a polygon of four or more corners: one that is convex by diagonals from its first corner, a
 /// quadrilateral that is not from the corner where it is caved in, others ear by ear (Meisters 1975), as seen along the
-/// sum of its corners' turns (Newell). What has no ears left, as it crosses itself, is cut from one corner.
+/// sum of its corners' turns (Newell). What has no ears left, as it crosses itself, is cut from one corner. Triangles
+/// are given by the numbers of their corners in the polygon, always two fewer than corners.
 ///
 /// # Errors
 /// [`MOST`] if it is neither convex nor that small.
-pub fn cut(vertices: &[[f64; 3]], polygon: &[u32], faces: &mut Vec<[u32; 3]>) -> Result<(), usize> {
+pub fn cut(
+    vertices: &[[f64; 3]],
+    polygon: &[u32],
+    mut push: impl FnMut([usize; 3]),
+) -> Result<(), usize> {
     let n = polygon.len();
     let at = |i: usize| vertices[polygon[i % n] as usize];
     let mut normal = [0.0; 3];
@@ -31,12 +36,9 @@ pub fn cut(vertices: &[[f64; 3]], polygon: &[u32], faces: &mut Vec<[u32; 3]>) ->
         [corner] if n == 4 => Some(corner),
         _ => None,
     };
-    let fan = |first: usize, faces: &mut Vec<[u32; 3]>| {
-        let corner = |i: usize| polygon[(first + i) % n];
-        faces.extend((1..n - 1).map(|i| [corner(0), corner(i), corner(i + 1)]));
-    };
     if let Some(first) = first {
-        fan(first, faces);
+        let corner = |i: usize| (first + i) % n;
+        (1..n - 1).for_each(|i| push([corner(0), corner(i), corner(i + 1)]));
         return Ok(());
     }
     if n > MOST {
@@ -59,12 +61,11 @@ pub fn cut(vertices: &[[f64; 3]], polygon: &[u32], faces: &mut Vec<[u32; 3]>) ->
         let Some(j) = (0..m).find(is_ear) else {
             break;
         };
-        let corner = |i: usize| polygon[left[i % m]];
-        faces.push([corner(j + m - 1), corner(j), corner(j + 1)]);
+        let corner = |i: usize| left[i % m];
+        push([corner(j + m - 1), corner(j), corner(j + 1)]);
         left.remove(j);
     }
-    let corner = |i: usize| polygon[left[i]];
-    faces.extend((1..left.len() - 1).map(|i| [corner(0), corner(i), corner(i + 1)]));
+    (1..left.len() - 1).for_each(|i| push([left[0], left[i], left[i + 1]]));
     Ok(())
 }
 
@@ -84,9 +85,9 @@ mod tests {
         let vertices: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1], 0.5]).collect();
         let polygon: Vec<u32> = (0..points.len() as u32).collect();
         let mut faces = Vec::new();
-        cut(&vertices, &polygon, &mut faces).unwrap();
-        let of = |f: &[u32; 3]| {
-            let [a, b, c] = f.map(|i| points[i as usize]);
+        cut(&vertices, &polygon, |face| faces.push(face)).unwrap();
+        let of = |f: &[usize; 3]| {
+            let [a, b, c] = f.map(|i| points[i]);
             0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
         };
         assert!(faces.iter().all(|f| of(f) >= 0.0), "{faces:?}");
@@ -121,12 +122,12 @@ mod tests {
         for vertices in [star, flat] {
             let polygon: Vec<u32> = (0..vertices.len() as u32).collect();
             let mut faces = Vec::new();
-            cut(&vertices, &polygon, &mut faces).unwrap();
+            cut(&vertices, &polygon, |face| faces.push(face)).unwrap();
             assert_eq!(faces.len(), vertices.len() - 2);
         }
         let zigzag: Vec<[f64; 3]> =
             (0..2000).map(|i| [f64::from(i), f64::from(i * i % 7), 0.0]).collect();
         let polygon: Vec<u32> = (0..2000).collect();
-        assert_eq!(cut(&zigzag, &polygon, &mut Vec::new()), Err(MOST));
+        assert_eq!(cut(&zigzag, &polygon, |_| {}), Err(MOST));
     }
 }

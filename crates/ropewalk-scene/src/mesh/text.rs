@@ -23,6 +23,20 @@ impl<'a> Words<'a> {
         Place::Line(self.line)
     }
 
+    /// The line of the last word, from 1.
+    pub fn line(&self) -> u64 {
+        self.line
+    }
+
+    /// What is left of this line, comments included.
+    pub fn rest_of_line(&mut self) -> &'a [u8] {
+        let start = self.at;
+        while self.at < self.bytes.len() && self.bytes[self.at] != b'\n' {
+            self.at += 1;
+        }
+        &self.bytes[start..self.at]
+    }
+
     /// Bytes that are left.
     pub fn left(&self) -> usize {
         self.bytes.len() - self.at

@@ -1,31 +1,40 @@
 //! glTF 2.0, as text with buffers beside it or in it, or binary (GLB).
 //!
-//! Triangles, strips and fans of all meshes that the scene's nodes name, moved by the nodes' transforms; points,
-//! lines, skins, morphs and cameras are passed over. Indices, strides and sparse accessors are followed with every
-//! bound checked.
+//! Triangles, strips and fans of all meshes that the scene's nodes name, moved by the nodes' transforms, with their
+//! materials, and the nodes' lights and first camera. Indices, strides and sparse accessors are followed with every bound
+//! checked.
 
+mod accessor;
+mod material;
+mod node;
+
+use super::Watched;
+use super::beside::Beside;
 use super::error::{Place, Result, wrong};
-use super::{MeshError, Soup, Watched};
+use super::picture::Pictures;
+use super::soup::Soup;
+use crate::stage::Stage;
+use accessor::Kinds;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use material::{Map, Materials};
 use serde_json::Value;
 use std::borrow::Cow;
-use std::path::{Component, Path, PathBuf};
 
 /// Deepest nesting of nodes.
 const MAX_DEPTH: usize = 256;
 
 /// Extensions without which positions cannot be read.
 const COMPRESSED: [&str; 3] =
-    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization"];
+    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
 /// A transform, row by row.
 type Matrix = [[f64; 4]; 3];
 
 const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
-/// Vertices and faces.
-pub fn parse(bytes: &[u8], folder: Option<&Path>, limits: &Watched<'_>) -> Result<Soup> {
+/// What a file says: a mesh in a stage, with looks if the soup has some.
+pub fn parse(bytes: &[u8], soup: Soup, beside: &Beside<'_>, limits: &Watched<'_>) -> Result<Stage> {
     let (json, bin) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let json: Value = serde_json::from_slice(json)
         .map_err(|e| wrong(Place::Line(e.line() as u64), "a glTF file: binary, or JSON text", e))?;
@@ -42,16 +51,21 @@ pub fn parse(bytes: &[u8], folder: Option<&Path>, limits: &Watched<'_>) -> Resul
             ));
         }
     }
+    let names = |key: &str, name: &str| array(&json, key).iter().any(|x| x.as_str() == Some(name));
+    let quantized = "KHR_mesh_quantization";
     let mut reader = Reader {
         json: &json,
         buffers: Vec::new(),
-        left: limits.bytes.saturating_sub(bytes.len() as u64),
-        soup: Soup::default(),
+        beside,
+        is_quantized: names("extensionsUsed", quantized) || names("extensionsRequired", quantized),
+        soup,
+        materials: Materials::default(),
+        stage: Stage::default(),
         limits,
     };
-    reader.load_buffers(bin, folder)?;
+    reader.load_buffers(bin)?;
     reader.visit_scene()?;
-    Ok(reader.soup)
+    reader.finish()
 }
 
 /// The JSON and the binary chunk of a GLB file.
@@ -88,9 +102,13 @@ fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>)> {
 struct Reader<'a> {
     json: &'a Value,
     buffers: Vec<Cow<'a, [u8]>>,
-    /// Bytes that buffers may still take.
-    left: u64,
+    beside: &'a Beside<'a>,
+    /// True if integers may stand for positions, normals and texture coordinates.
+    is_quantized: bool,
     soup: Soup,
+    materials: Materials,
+    /// Lights and the view.
+    stage: Stage,
     limits: &'a Watched<'a>,
 }
 
@@ -122,15 +140,18 @@ fn entry<'a>(json: &'a Value, list: &str, index: usize, name: &str) -> Result<&'
 }
 
 impl<'a> Reader<'a> {
-    fn load_buffers(&mut self, bin: Option<&'a [u8]>, folder: Option<&Path>) -> Result<()> {
+    fn load_buffers(&mut self, bin: Option<&'a [u8]>) -> Result<()> {
         for (i, buffer) in array(self.json, "buffers").iter().enumerate() {
             let name = format!("buffers[{i}]");
             let length = integer(buffer, "byteLength", &name)?.unwrap_or(0);
-            let bytes: Cow<'a, [u8]> = match buffer["uri"].as_str() {
-                None if i == 0 && bin.is_some() => Cow::Borrowed(bin.unwrap_or_default()),
-                None => return Err(wrong(part(name), "a uri or a binary chunk", "neither")),
-                Some(uri) => Cow::Owned(self.fetch(uri, length, &name, folder)?),
-            };
+            let bytes: Cow<'a, [u8]> =
+                match buffer["uri"].as_str() {
+                    None if i == 0 && bin.is_some() => Cow::Borrowed(bin.unwrap_or_default()),
+                    None => return Err(wrong(part(name), "a uri or a binary chunk", "neither")),
+                    Some(uri) => Cow::Owned(fetch(uri, length, self.beside).map_err(
+                        |(expected, found)| wrong(part(format!("{name}.uri")), expected, found),
+                    )?),
+                };
             if bytes.len() < length {
                 let what = format!("{length} bytes, as byteLength says");
                 return Err(wrong(part(name), what, bytes.len()));
@@ -140,39 +161,24 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// The bytes that a URI holds or names: data in base64, or a file in the folder of this one or below.
-    fn fetch(
-        &mut self,
-        uri: &str,
-        length: usize,
-        name: &str,
-        folder: Option<&Path>,
-    ) -> Result<Vec<u8>> {
-        let place = || part(format!("{name}.uri"));
-        if let Some(data) = uri.strip_prefix("data:") {
-            let Some((_, text)) = data.split_once(";base64,") else {
-                return Err(wrong(place(), "data in base64", uri));
-            };
-            return STANDARD.decode(text).map_err(|e| wrong(place(), "data in base64", e));
+    /// The stage of what was read.
+    fn finish(self) -> Result<Stage> {
+        let Reader { json, buffers, beside, soup, materials, stage, limits, .. } = self;
+        if soup.looks.is_none() {
+            return Ok(Stage { mesh: soup.mesh(limits)?, ..stage });
         }
-        let relative = PathBuf::from(decode_percent(uri));
-        let is_plain = relative.components().all(|c| matches!(c, Component::Normal(_)));
-        if uri.contains("://") || uri.contains('\\') || !is_plain || uri.is_empty() {
-            let what = "a file in this folder or below, without \"..\"";
-            return Err(wrong(place(), what, uri));
-        }
-        let Some(folder) = folder else {
-            return Err(wrong(place(), "data in the file itself, since it has no folder", uri));
+        let mut soup = soup;
+        let (materials, images) = {
+            let source = material::Source { json, buffers: &buffers, beside };
+            let mut pictures = Pictures::default();
+            let looks = soup.looks.get_or_insert_default();
+            let all = materials.read(&source, &mut pictures, &mut looks.skipped, limits)?;
+            (all, pictures.images)
         };
-        let path = folder.join(relative);
-        let cannot = |e: std::io::Error| wrong(place(), format!("to read {uri}"), e);
-        let size = std::fs::metadata(&path).map_err(cannot)?.len();
-        if size < length as u64 || size > self.left {
-            let what = format!("a file of {length} to {} bytes", self.left);
-            return Err(wrong(place(), what, format!("{uri} of {size}")));
-        }
-        self.left -= size;
-        std::fs::read(&path).map_err(cannot)
+        node::note_skipped(json, &mut soup);
+        let dressed = soup.stage(limits)?;
+        let (lights, camera) = (stage.lights, stage.camera);
+        Ok(Stage { materials, images, lights, camera, ..dressed })
     }
 
     /// Reads the meshes of the default scene, or of all root nodes, or all of them where there are no nodes.
@@ -213,6 +219,10 @@ impl<'a> Reader<'a> {
             if let Some(mesh) = integer(node, "mesh", &name)? {
                 self.read_mesh(mesh, &matrix, &format!("{name}.mesh"))?;
             }
+            if self.soup.looks.is_some() {
+                self.read_light(node, &matrix, &name)?;
+                self.read_camera(node, &matrix, &name)?;
+            }
             let children = self.list(node, "children", &name)?;
             stack.extend(children.into_iter().rev().map(|child| (child, matrix, depth + 1)));
         }
@@ -239,8 +249,10 @@ impl<'a> Reader<'a> {
     fn read_primitive(&mut self, primitive: &Value, matrix: &Matrix, name: &str) -> Result<()> {
         let mode = integer(primitive, "mode", name)?.unwrap_or(4);
         match mode {
-            // Points and lines.
-            0..=3 => return Ok(()),
+            0..=3 => {
+                self.soup.skip("points and lines");
+                return Ok(());
+            }
             4..=6 => {}
             _ => return Err(wrong(part(format!("{name}.mode")), "a mode from 0 to 6", mode)),
         }
@@ -249,31 +261,40 @@ impl<'a> Reader<'a> {
             return Err(wrong(part(attributes), "POSITION", "none"));
         };
         let base = self.soup.vertices.len();
-        let points = self.accessor(positions, "VEC3", &[5126], &format!("{name}.POSITION"))?;
-        for point in points.as_chunks::<3>().0 {
+        let kinds = if self.is_quantized { Kinds::Any } else { Kinds::Float };
+        let points = self.accessor(positions, &["VEC3"], kinds, &format!("{name}.POSITION"))?;
+        let place = || part(format!("accessors[{positions}]"));
+        for point in points.values.as_chunks::<3>().0 {
             let moved = matrix.map(|[x, y, z, t]| x * point[0] + y * point[1] + z * point[2] + t);
-            self.soup.vertex(part(format!("accessors[{positions}]")), moved, self.limits)?;
+            self.soup.vertex(place, moved, self.limits)?;
         }
-        let count = points.len() / 3;
-        let place = part(format!("{name}.indices"));
-        let indices: Vec<f64> = match integer(primitive, "indices", name)? {
-            None => (0..count).map(|i| i as f64).collect(),
+        let count = points.values.len() / 3;
+        drop(points);
+        if self.soup.looks.is_some() {
+            self.read_looks(primitive, matrix, count, name)?;
+        }
+        let place = || part(format!("{name}.indices"));
+        let indices: Option<Vec<f64>> = match integer(primitive, "indices", name)? {
+            None => None,
             Some(indices) => {
-                self.accessor(indices, "SCALAR", &[5121, 5123, 5125], &format!("{name}.indices"))?
+                let named_by = format!("{name}.indices");
+                Some(self.accessor(indices, &["SCALAR"], Kinds::Index, &named_by)?.values)
             }
         };
-        if let Some(wrong_one) = indices.iter().find(|&&i| i >= count as f64) {
+        if let Some(wrong_one) = indices.iter().flatten().find(|&&i| i >= count as f64) {
             let what = match count {
                 0 => "no vertex, since there are none".to_owned(),
                 n => format!("a vertex from 0 to {}", n - 1),
             };
-            return Err(wrong(place, what, wrong_one));
+            return Err(wrong(place(), what, wrong_one));
         }
-        let n = indices.len();
+        let n = indices.as_ref().map_or(count, Vec::len);
         if n < 3 && n > 0 || mode == 4 && !n.is_multiple_of(3) {
-            return Err(wrong(place, "three vertices a triangle", n));
+            return Err(wrong(place(), "three vertices a triangle", n));
         }
         let triangles = if mode == 4 { n / 3 } else { n.saturating_sub(2) };
+        // A mirrored mesh is turned inside out, which its faces make up for (glTF 2.0, section 3.7.4).
+        let is_mirrored = determinant(matrix) < 0.0;
         for i in 0..triangles {
             let [a, b, c] = match mode {
                 4 => [3 * i, 3 * i + 1, 3 * i + 2],
@@ -282,135 +303,131 @@ impl<'a> Reader<'a> {
                 5 => [i + 1, i, i + 2],
                 _ => [0, i + 1, i + 2],
             };
-            let corner = |i: usize| (base + indices[i] as usize) as u32;
-            self.soup.corners.extend([corner(a), corner(b), corner(c)]);
-            self.soup.end_polygon(place.clone(), self.limits)?;
+            let corner =
+                |i: usize| (base + indices.as_ref().map_or(i, |all| all[i] as usize)) as u32;
+            let (b, c) = if is_mirrored { (c, b) } else { (b, c) };
+            self.soup.open.extend([corner(a), corner(b), corner(c)]);
+            self.soup.end_polygon(place, self.limits)?;
         }
         Ok(())
     }
 
-    /// The numbers of an accessor, all components in turn.
-    fn accessor(
-        &self,
-        index: usize,
-        shape: &str,
-        kinds: &[u64],
-        named_by: &str,
-    ) -> Result<Vec<f64>> {
-        let accessor = entry(self.json, "accessors", index, named_by)?;
-        let name = format!("accessors[{index}]");
-        if accessor["type"].as_str() != Some(shape) {
-            return Err(wrong(part(format!("{name}.type")), shape, &accessor["type"]));
-        }
-        let kind = component(accessor, kinds, &name)?;
-        let width = if shape == "VEC3" { 3 } else { 1 };
-        let count = integer(accessor, "count", &name)?.unwrap_or(0);
-        let sparse = &accessor["sparse"];
-        let mut numbers = match integer(accessor, "bufferView", &name)? {
-            Some(view) => {
-                let offset = integer(accessor, "byteOffset", &name)?.unwrap_or(0);
-                self.elements(view, offset, count, width, kind, &name)?
-            }
-            None => {
-                // Zeros; not more of them than what changes some could be told of.
-                let most = self.buffers.iter().map(|b| b.len()).sum::<usize>().max(1 << 16);
-                if count > most.min(self.limits.vertices) {
-                    return Err(wrong(
-                        part(format!("{name}.count")),
-                        format!("at most {most}"),
-                        count,
-                    ));
-                }
-                vec![0.0; count * width]
-            }
-        };
-        if !sparse.is_null() {
-            let changes = integer(sparse, "count", &format!("{name}.sparse"))?.unwrap_or(0);
-            let rows = |key: &str, width: usize, kinds: &[u64]| {
-                let (part, name) = (&sparse[key], format!("{name}.sparse.{key}"));
-                let kind = if key == "values" { kind } else { component(part, kinds, &name)? };
-                let view = integer(part, "bufferView", &name)?.unwrap_or(usize::MAX);
-                let offset = integer(part, "byteOffset", &name)?.unwrap_or(0);
-                self.elements(view, offset, changes, width, kind, &name)
-            };
-            let (at, values) =
-                (rows("indices", 1, &[5121, 5123, 5125])?, rows("values", width, &[])?);
-            for (at, value) in at.into_iter().zip(values.chunks_exact(width)) {
-                let at = at as usize;
-                let Some(row) = numbers.get_mut(at * width..(at + 1) * width) else {
-                    let place = part(format!("{name}.sparse.indices"));
-                    return Err(wrong(place, format!("elements below {count}"), at));
-                };
-                row.copy_from_slice(value);
-            }
-        }
-        Ok(numbers)
-    }
-
-    /// Elements of a buffer view.
-    fn elements(
-        &self,
-        view: usize,
-        offset: usize,
+    /// Normals, texture coordinates, colours and the material of a primitive whose vertices were added last.
+    fn read_looks(
+        &mut self,
+        primitive: &Value,
+        matrix: &Matrix,
         count: usize,
-        width: usize,
-        kind: u64,
         name: &str,
-    ) -> Result<Vec<f64>> {
-        let json = entry(self.json, "bufferViews", view, &format!("{name}.bufferView"))?;
-        let view_name = format!("bufferViews[{view}]");
-        let size = match kind {
-            5121 => 1,
-            5123 => 2,
-            _ => 4,
+    ) -> Result<()> {
+        let attributes = &primitive["attributes"];
+        let named = integer(primitive, "material", name)?;
+        let (material, map) = self.materials.of_primitive(self.json, named, name)?;
+        let fits = |found: usize, key: &str| {
+            let what = format!("{count} of them, as there are positions");
+            if found == count {
+                Ok(())
+            } else {
+                Err(wrong(part(format!("{name}.{key}")), what, found))
+            }
         };
-        let buffer = integer(json, "buffer", &view_name)?.unwrap_or(usize::MAX);
-        let Some(bytes) = self.buffers.get(buffer) else {
-            let what = format!("one of the {} buffers", self.buffers.len());
-            return Err(wrong(part(format!("{view_name}.buffer")), what, &json["buffer"]));
-        };
-        let start = integer(json, "byteOffset", &view_name)?.unwrap_or(0);
-        let length = integer(json, "byteLength", &view_name)?.unwrap_or(0);
-        let Some(bytes) = bytes.get(start..).and_then(|rest| rest.get(..length)) else {
-            let what =
-                format!("{length} bytes from {start} on within the buffer's {}", bytes.len());
-            return Err(wrong(part(view_name), what, "fewer"));
-        };
-        let stride = integer(json, "byteStride", &view_name)?.unwrap_or(size * width);
-        if stride < size * width {
-            let place = part(format!("{view_name}.byteStride"));
-            return Err(wrong(place, format!("at least {}", size * width), stride));
+        let mut normals = Vec::new();
+        if let Some(index) = integer(attributes, "NORMAL", name)? {
+            let rows =
+                self.accessor(index, &["VEC3"], Kinds::Any, &format!("{name}.NORMAL"))?.values;
+            fits(rows.len() / 3, "NORMAL")?;
+            let cofactors = cofactors(matrix);
+            let turn =
+                |n: &[f64; 3]| cofactors.map(|row| (0..3).map(|a| row[a] * n[a]).sum::<f64>());
+            normals = rows.as_chunks::<3>().0.iter().map(|n| small(turn(n))).collect();
         }
-        // All are below 2^48.
-        let end = match count {
-            0 => offset as u128,
-            n => offset as u128 + (n - 1) as u128 * stride as u128 + (size * width) as u128,
+        let (mut uvs, Map { set, transform }) = (Vec::new(), map);
+        let key = format!("TEXCOORD_{set}");
+        if let Some(index) = integer(attributes, &key, name)? {
+            let rows =
+                self.accessor(index, &["VEC2"], Kinds::Any, &format!("{name}.{key}"))?.values;
+            fits(rows.len() / 2, &key)?;
+            let place =
+                |&[u, v]: &[f64; 2]| transform.map(|row| (row[0] * u + row[1] * v + row[2]) as f32);
+            let sound = |uv: [f32; 2]| if uv.iter().all(|x| x.is_finite()) { uv } else { [0.0; 2] };
+            uvs = rows.as_chunks::<2>().0.iter().map(|uv| sound(place(uv))).collect();
+        }
+        let mut colors = Vec::new();
+        if let Some(index) = integer(attributes, "COLOR_0", name)? {
+            let rows =
+                self.accessor(index, &["VEC3", "VEC4"], Kinds::Any, &format!("{name}.COLOR_0"))?;
+            fits(rows.values.len() / rows.width, "COLOR_0")?;
+            let share = |x: f64| if x.is_nan() { 1.0 } else { x.clamp(0.0, 1.0) as f32 };
+            let color = |row: &[f64]| [share(row[0]), share(row[1]), share(row[2])];
+            colors = rows.values.chunks_exact(rows.width).map(color).collect();
+        }
+        let after = self.soup.vertices.len();
+        let before = after - count;
+        let Some(looks) = &mut self.soup.looks else {
+            return Ok(());
         };
-        if end > length as u128 {
-            let what = format!("{count} elements within the {length} bytes of {view_name}");
-            return Err(wrong(part(name), what, format!("{end} bytes needed")));
+        looks.material = material;
+        // Primitives that lack what others have get what stands for nothing.
+        if !normals.is_empty() {
+            looks.normals.resize(before, [0.0; 3]);
+            looks.normals.extend(normals);
         }
-        let mut numbers = Vec::with_capacity(count * width);
-        for i in 0..count {
-            let element = &bytes[offset + i * stride..][..size * width];
-            numbers.extend(element.chunks_exact(size).map(|b| match (kind, b) {
-                (5121, &[x]) => f64::from(x),
-                (5123, &[x, y]) => f64::from(u16::from_le_bytes([x, y])),
-                (5125, &[x, y, z, w]) => f64::from(u32::from_le_bytes([x, y, z, w])),
-                (_, &[x, y, z, w]) => f64::from(f32::from_le_bytes([x, y, z, w])),
-                _ => f64::NAN,
-            }));
+        if !uvs.is_empty() {
+            looks.uvs.resize(before, [0.0; 2]);
+            looks.uvs.extend(uvs);
         }
-        Ok(numbers)
+        if !colors.is_empty() {
+            looks.colors.resize(before, [1.0; 3]);
+            looks.colors.extend(colors);
+        }
+        if array(primitive, "targets").iter().any(|_| true) {
+            looks.skipped.note("morph targets");
+        }
+        Ok(())
     }
 }
 
-fn component(json: &Value, kinds: &[u64], name: &str) -> Result<u64> {
-    let kind = json["componentType"].as_u64().filter(|kind| kinds.contains(kind));
-    kind.ok_or_else(|| -> MeshError {
-        let what = format!("one of {kinds:?}");
-        wrong(part(format!("{name}.componentType")), what, &json["componentType"])
+/// The bytes that a URI holds or names: data in base64, or a file in the folder of this one or below. The error is what was
+/// expected and what was found.
+fn fetch(
+    uri: &str,
+    least: usize,
+    beside: &Beside<'_>,
+) -> std::result::Result<Vec<u8>, (String, String)> {
+    let Some(data) = uri.strip_prefix("data:") else {
+        let read = beside.read(&decode_percent(uri), least as u64);
+        return read.map_err(|why| (why.expected, why.found));
+    };
+    let Some((_, text)) = data.split_once(";base64,") else {
+        return Err(("data in base64".into(), uri.into()));
+    };
+    // No longer than the text, which is within the limits.
+    STANDARD.decode(text).map_err(|e| ("data in base64".into(), e.to_string()))
+}
+
+/// Rounded, after it is scaled to a length that `f32` holds.
+fn small(v: [f64; 3]) -> [f32; 3] {
+    let most = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    if most > 0.0 && most.is_finite() { v.map(|x| (x / most) as f32) } else { [0.0; 3] }
+}
+
+/// The matrix that moves normals, up to a factor: of cofactors, with the sign of the determinant, since faces of mirrored
+/// meshes are turned.
+fn cofactors(m: &Matrix) -> [[f64; 3]; 3] {
+    let sign = if determinant(m) < 0.0 { -1.0 } else { 1.0 };
+    std::array::from_fn(|i| {
+        let (p, q) = (m[(i + 1) % 3], m[(i + 2) % 3]);
+        std::array::from_fn(|j| {
+            let (k, l) = ((j + 1) % 3, (j + 2) % 3);
+            sign * (p[k] * q[l] - p[l] * q[k])
+        })
     })
+}
+
+fn determinant(m: &Matrix) -> f64 {
+    let [a, b, c] = m;
+    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
+        + a[2] * (b[0] * c[1] - b[1] * c[0])
 }
 
 /// The transform of a node: its matrix, or translation times rotation times scale.
