@@ -3,7 +3,7 @@ SHELL := /bin/bash
 .DEFAULT_GOAL := help
 CARGO ?= cargo
 OUT ?= out
-FUZZ_SECONDS ?= 60
+FUZZ_SECONDS ?= 10
 PREFIX ?= /usr/local
 
 .PHONY: help demo test check fmt clippy unit doc inlined c install-c python fuzz bench bench-build bench-python clean

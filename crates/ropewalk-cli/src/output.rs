@@ -29,6 +29,15 @@ pub fn fail(error: &anyhow::Error) -> ExitCode {
     ExitCode::from(if error.is::<UsageError>() { 2 } else { 1 })
 }
 
+/// Prints text to standard output; a reader that closes it has seen enough.
+pub fn print_text(text: &str) -> anyhow::Result<()> {
+    use std::io::{ErrorKind, Write};
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}
+
 /// Prints one JSON object to standard output.
 pub fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
     use std::io::Write;

@@ -1,13 +1,14 @@
 //! `ropewalk info FILE` of scenes and meshes that are not saved ones.
 
 use crate::interrupt::{self, Cancel};
-use crate::output::{print_json, thousands};
+use crate::output::{print_json, print_text, thousands};
 use ropewalk_scene::stage::Light;
 use ropewalk_scene::{
     Camera, Defects, FacetPolicy, Loaded, MeshFormat, MeshLimits, NffLimits, Recognised, Scene,
     Stage, Surface, load_monitored, parse_builtin, recognise,
 };
 use serde::Serialize;
+use std::fmt::Write;
 use std::path::Path;
 use std::time::Instant;
 
@@ -201,14 +202,15 @@ impl MeshOutput {
     }
 
     fn print(&self) -> anyhow::Result<()> {
-        let count = |what: &str, number: usize| {
-            println!("  {what:22}{:>12}", thousands(number as u64));
+        let mut out = String::new();
+        let count = |out: &mut String, what: &str, number: usize| {
+            writeln!(out, "  {what:22}{:>12}", thousands(number as u64))
         };
-        println!("{}: a mesh in {}", self.file, self.format);
-        count("triangles", self.triangles);
-        count("vertices", self.vertices);
+        writeln!(out, "{}: a mesh in {}", self.file, self.format)?;
+        count(&mut out, "triangles", self.triangles)?;
+        count(&mut out, "vertices", self.vertices)?;
         if let Some([low, high]) = &self.bounds {
-            println!("  box                   {low:?} to {high:?}");
+            writeln!(out, "  box                   {low:?} to {high:?}")?;
         }
         let has = [
             (self.normals, "normals"),
@@ -217,43 +219,49 @@ impl MeshOutput {
         ];
         let has: Vec<&str> = has.iter().filter(|(has, _)| *has).map(|(_, what)| *what).collect();
         if !has.is_empty() {
-            println!("  has                   {}", has.join(", "));
+            writeln!(out, "  has                   {}", has.join(", "))?;
         }
-        count("materials", self.materials.len());
+        count(&mut out, "materials", self.materials.len())?;
         for material in self.materials.iter().filter(|material| !material.name.is_empty()) {
-            println!(
+            writeln!(
+                out,
                 "    {:<30} {:>10}",
-                material.name.escape_debug(),
+                material.name.escape_debug().to_string(),
                 thousands(material.triangles as u64)
-            );
+            )?;
         }
-        count("textures", self.textures.len());
+        count(&mut out, "textures", self.textures.len())?;
         let LightCounts { point, spot, directional } = &self.lights;
-        count("lights", point + spot + directional);
+        count(&mut out, "lights", point + spot + directional)?;
         if let Some(CameraOutput { from, at, angle, .. }) = &self.camera {
-            println!("  camera                from {from:?} to {at:?}, {angle:.1} degrees");
+            writeln!(out, "  camera                from {from:?} to {at:?}, {angle:.1} degrees")?;
         }
         for what in &self.skipped {
-            println!("  not read              {what}");
+            writeln!(out, "  not read              {what}")?;
         }
         let closed = if self.closed { "closed, turned alike everywhere" } else { "not closed" };
-        println!("  surface               {closed}");
+        writeln!(out, "  surface               {closed}")?;
         let defects = &self.defects;
-        count("degenerate triangles", defects.degenerate_triangles);
-        count("duplicate triangles", defects.duplicate_triangles);
-        count("boundary edges", defects.boundary_edges);
-        count("  in loops", defects.boundary_loops);
-        count("non-manifold edges", defects.non_manifold_edges);
-        count("turned edges", defects.turned_edges);
-        count("isolated vertices", defects.isolated_vertices);
+        count(&mut out, "degenerate triangles", defects.degenerate_triangles)?;
+        count(&mut out, "duplicate triangles", defects.duplicate_triangles)?;
+        count(&mut out, "boundary edges", defects.boundary_edges)?;
+        count(&mut out, "  in loops", defects.boundary_loops)?;
+        count(&mut out, "non-manifold edges", defects.non_manifold_edges)?;
+        count(&mut out, "turned edges", defects.turned_edges)?;
+        count(&mut out, "isolated vertices", defects.isolated_vertices)?;
         if defects.equal_vertices > 0 {
-            println!(
+            writeln!(
+                out,
                 "  {} vertices lie at the place of another one and count as that in the figures of edges and triangles",
                 thousands(defects.equal_vertices as u64)
-            );
+            )?;
         }
-        println!("  read in {:.2} s, checked in {:.2} s", self.seconds.read, self.seconds.check);
-        Ok(())
+        writeln!(
+            out,
+            "  read in {:.2} s, checked in {:.2} s",
+            self.seconds.read, self.seconds.check
+        )?;
+        print_text(&out)
     }
 }
 
@@ -291,7 +299,8 @@ impl SceneOutput {
     }
 
     fn print(&self) -> anyhow::Result<()> {
-        println!("{}: a scene in NFF", self.file);
+        let mut out = String::new();
+        writeln!(out, "{}: a scene in NFF", self.file)?;
         let counts = [
             ("objects", self.objects),
             ("  spheres", self.spheres),
@@ -302,14 +311,14 @@ impl SceneOutput {
             ("lights", self.lights),
         ];
         for (what, number) in counts {
-            println!("  {what:22}{:>12}", thousands(number as u64));
+            writeln!(out, "  {what:22}{:>12}", thousands(number as u64))?;
         }
         if let Some([low, high]) = &self.bounds {
-            println!("  box                   {low:?} to {high:?}");
+            writeln!(out, "  box                   {low:?} to {high:?}")?;
         }
         if let Some(CameraOutput { from, at, angle, .. }) = &self.camera {
-            println!("  camera                from {from:?} to {at:?}, {angle:.1} degrees");
+            writeln!(out, "  camera                from {from:?} to {at:?}, {angle:.1} degrees")?;
         }
-        Ok(())
+        print_text(&out)
     }
 }

@@ -5,6 +5,9 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
+/// What is said of a file that is not there.
+const ABSENT: &str = "there is no such file";
+
 /// Reads files of one folder.
 pub struct Beside<'a> {
     /// `None` for files that came from memory: those have nothing beside them.
@@ -21,6 +24,17 @@ pub struct Refused {
 }
 
 impl Refused {
+    /// A part of a sentence that names the file elsewhere.
+    pub fn sentence(&self, name: &str) -> String {
+        if self.found == ABSENT {
+            return ABSENT.to_owned();
+        }
+        let found =
+            self.found.strip_prefix(name).unwrap_or(&self.found).trim_start_matches([',', ' ']);
+        let found = if found.is_empty() { "something else" } else { found };
+        format!("expected {}, found {found}", self.expected)
+    }
+
     fn new(expected: impl Into<String>, found: impl Into<String>) -> Refused {
         Refused { expected: expected.into(), found: found.into() }
     }
@@ -52,7 +66,7 @@ impl<'a> Beside<'a> {
         };
         let cannot = |e: std::io::Error| {
             let why = match e.kind() {
-                std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
+                std::io::ErrorKind::NotFound => ABSENT.to_owned(),
                 _ => e.to_string(),
             };
             Refused::new(format!("to read {name}"), why)
@@ -68,7 +82,7 @@ impl<'a> Beside<'a> {
         let (size, left) = (size.len(), self.left.get());
         if size < least || size > left {
             let what = format!("a file of {least} to {left} bytes");
-            return Err(Refused::new(what, format!("{name} of {size}")));
+            return Err(Refused::new(what, format!("{name}, {size} bytes")));
         }
         let mut bytes = Vec::new();
         let file = File::open(&path).map_err(cannot)?;

@@ -57,7 +57,7 @@ pub fn dress(
             Some(raw) => translate(raw, beside, &mut pictures, &mut skipped, limits)?,
             None => {
                 if !name.is_empty() {
-                    skipped.note(format!("material {name}, which no library of the file has"));
+                    skipped.note_named("materials that no library of the file has", name);
                 }
                 Material::default()
             }
@@ -83,7 +83,7 @@ fn read_libraries(
     for name in names.split_ascii_whitespace().take(100) {
         match read(name) {
             Ok(text) => read_library(&text, library, skipped),
-            Err(why) => skipped.note(format!("material library {name}: {why}")),
+            Err(why) => skipped.note_named(&format!("material libraries, {why}"), name),
         }
     }
 }

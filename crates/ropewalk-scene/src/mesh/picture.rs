@@ -84,7 +84,7 @@ impl Pictures {
                 Some(self.images.len() as u32 - 1)
             }
             Err(why) => {
-                skipped.note(format!("texture {name}: {why}"));
+                skipped.note_named(&format!("textures, {why}"), name);
                 None
             }
         };
@@ -155,5 +155,5 @@ fn decode(bytes: &[u8], pixels: u64) -> std::result::Result<Decoded, String> {
 
 /// The file `name` beside the scene, for [`Pictures::get`].
 pub fn load(beside: &Beside<'_>, name: &str) -> std::result::Result<Vec<u8>, String> {
-    beside.read(name, 0).map_err(|why| format!("expected {}, found {}", why.expected, why.found))
+    beside.read(name, 0).map_err(|why| why.sentence(name))
 }

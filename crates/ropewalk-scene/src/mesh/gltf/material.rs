@@ -3,10 +3,10 @@
 use super::super::Watched;
 use super::super::beside::Beside;
 use super::super::error::{Result, wrong};
-use super::super::picture::Pictures;
+use super::super::picture::{Pictures, load};
 use super::super::skipped::Skipped;
 use super::node::numbers;
-use super::{array, entry, fetch, integer, part};
+use super::{array, decode_percent, entry, fetch, integer, part};
 use crate::stage::{Alpha, Material, Texture, Wrap};
 use serde_json::Value;
 use std::borrow::Cow;
@@ -212,6 +212,7 @@ fn texture(
     };
     let picture = entry(json, "images", image, &format!("{name}.source"))?;
     let load = || match picture["uri"].as_str() {
+        Some(uri) if !uri.starts_with("data:") => load(source.beside, &decode_percent(uri)),
         Some(uri) => fetch(uri, 0, source.beside).map_err(|(expected, found)| {
             // Data may be long.
             let found: String = found.chars().take(80).collect();
