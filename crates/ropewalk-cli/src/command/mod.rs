@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod build;
 pub mod info;
+pub mod paths;
 pub mod render;
 pub mod scene;
 pub mod stats;
