@@ -1,7 +1,7 @@
 //! Light from infinitely far away: a picture of all directions, from a file or of a plain sky.
 
-use super::alias::AliasTable;
 use super::bsdf::luminance;
+use super::distribution::Distribution;
 use crate::error::RenderError;
 use glam::Vec3;
 use std::f32::consts::{PI, TAU};
@@ -20,8 +20,8 @@ pub struct Environment {
     width: u32,
     height: u32,
     radiance: Vec<Vec3>,
-    table: AliasTable,
-    /// Integral of the luminance over all directions.
+    table: Distribution,
+    /// Integral of the luminance over all directions that are sampled.
     power: f32,
 }
 
@@ -46,14 +46,15 @@ impl Environment {
             ));
         }
         let radiance: Vec<Vec3> = pixels.iter().map(|&p| Vec3::from_array(p)).collect();
-        Ok(Self::of(width, height, radiance))
+        Ok(Self::of(width, height, radiance, height))
     }
 
-    fn of(width: u32, height: u32, radiance: Vec<Vec3>) -> Self {
+    /// Of which so many rows are worth sampling.
+    fn of(width: u32, height: u32, radiance: Vec<Vec3>, rows: u32) -> Self {
         let (w, h) = (width as usize, height as usize);
         let mut weights = vec![0f64; w * h];
         let mut power = 0.0;
-        for y in 0..h {
+        for y in 0..rows as usize {
             let sine = (PI * (y as f32 + 0.5) / h as f32).sin();
             for x in 0..w {
                 // Values between pixels come from their neighbours: where these shine, light must be looked for.
@@ -68,12 +69,12 @@ impl Environment {
             }
         }
         let power = (power * f64::from(2.0 * PI * PI) / (w * h) as f64) as f32;
-        Environment { width, height, radiance, table: AliasTable::new(&weights), power }
+        Environment { width, height, radiance, table: Distribution::new(w, &weights), power }
     }
 
     /// The same radiance from everywhere.
     pub fn even(radiance: [f32; 3]) -> Self {
-        Self::of(1, 1, vec![Vec3::from_array(radiance)])
+        Self::of(1, 1, vec![Vec3::from_array(radiance)], 1)
     }
 
     /// Reads a picture of linear radiance: Radiance HDR (`.hdr`) or OpenEXR (`.exr`).
@@ -105,10 +106,11 @@ impl Environment {
         })
     }
 
-    /// A clear sky without its sun: blue above, pale at the horizon; below it the colour of lit ground.
-    pub fn sky() -> Self {
-        let (zenith, horizon) = (Vec3::new(0.26, 0.42, 0.78), Vec3::new(0.82, 0.88, 0.96));
-        let ground = Vec3::new(0.52, 0.51, 0.50);
+    /// A clear sky without its sun: blue above, pale at the horizon; below it the colour of lit ground. Where there is
+    /// ground, nothing is lit from below the horizon, and it is not sampled.
+    pub fn sky(has_ground: bool) -> Self {
+        let (zenith, horizon) = (Vec3::new(0.17, 0.25, 0.42), Vec3::new(0.55, 0.59, 0.63));
+        let ground = Vec3::new(0.48, 0.465, 0.45);
         let [width, height] = SKY;
         let row = |y: u32| {
             let up = (PI * (y as f32 + 0.5) / height as f32).cos();
@@ -118,7 +120,8 @@ impl Environment {
             horizon.lerp(zenith, 1.0 - (1.0 - up).powi(4))
         };
         let radiance = (0..height).flat_map(|y| std::iter::repeat_n(row(y), width as usize));
-        Self::of(width, height, radiance.collect())
+        let rows = if has_ground { height / 2 } else { height };
+        Self::of(width, height, radiance.collect(), rows)
     }
 
     /// Radiance that comes from a direction.
@@ -141,12 +144,10 @@ impl Environment {
         if self.table.is_empty() {
             return None;
         }
-        let (pixel, rest) = self.table.sample(u[0]);
-        let (x, y) = (pixel as u32 % self.width, pixel as u32 / self.width);
-        let phi = TAU * (x as f32 + rest) / self.width as f32;
-        let theta = PI * (y as f32 + u[1]) / self.height as f32;
+        let ([x, y], density) = self.table.sample(u);
+        let (phi, theta) = (TAU * x, PI * y);
         let direction = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-        Some((direction, self.pixel_density(pixel, theta.sin())))
+        Some((direction, by_solid_angle(density, theta.sin())))
     }
 
     /// The density of [`Environment::sample`] by solid angle.
@@ -154,22 +155,18 @@ impl Environment {
         if self.table.is_empty() {
             return 0.0;
         }
-        let [u, v] = place(direction);
-        let x = ((u * self.width as f32) as u32).min(self.width - 1);
-        let y = ((v * self.height as f32) as u32).min(self.height - 1);
-        let sine = direction.truncate().length();
-        self.pixel_density((y * self.width + x) as usize, sine)
+        by_solid_angle(self.table.density(place(direction)), direction.truncate().length())
     }
 
-    fn pixel_density(&self, pixel: usize, sine: f32) -> f32 {
-        let pixels = (self.width as f32) * (self.height as f32);
-        self.table.probability(pixel) * pixels / (2.0 * PI * PI * sine.max(1e-6))
-    }
-
-    /// The integral of the luminance over all directions.
+    /// The integral of the luminance over all directions that are sampled.
     pub(crate) fn power(&self) -> f32 {
         self.power
     }
+}
+
+/// A density over the picture as one by solid angle, where the angle to the zenith has this sine.
+fn by_solid_angle(density: f32, sine: f32) -> f32 {
+    density / (2.0 * PI * PI * sine.max(1e-6))
 }
 
 /// Where a direction lies in the picture, 0 to 1 across and down.

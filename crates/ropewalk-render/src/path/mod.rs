@@ -8,6 +8,7 @@ mod albedo;
 mod alias;
 mod bsdf;
 mod camera;
+mod distribution;
 mod environment;
 mod file;
 mod film;

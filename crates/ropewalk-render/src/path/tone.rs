@@ -58,8 +58,8 @@ const OUTSET: Mat3 = Mat3::from_cols_array(&[
 const STOPS: [f32; 2] = [-12.473_93, 4.026_069];
 
 /// The contrast and the colour that the curve is given ("punchy" is 1.35 and 1.4): its plain form is flat.
-const POWER: f32 = 1.16;
-const SATURATION: f32 = 1.22;
+const POWER: f32 = 1.25;
+const SATURATION: f32 = 1.3;
 
 /// Display values 0 to 1, sRGB encoded, of linear radiance.
 pub(crate) fn display(radiance: Vec3, tone: Tone) -> Vec3 {

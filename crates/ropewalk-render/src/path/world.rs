@@ -21,7 +21,7 @@ const GROUND_REACH: f64 = 60.0;
 const GROUND_GAP: f64 = 1e-3;
 
 /// Irradiance by the sun of the built-in sky.
-const SUN: Vec3 = Vec3::new(3.5, 3.2, 2.8);
+const SUN: Vec3 = Vec3::new(3.7, 3.4, 2.98);
 
 /// Where that sun stands: turned to the left of the front, and raised, in degrees.
 const SUN_TURN: f64 = -42.0;
@@ -142,7 +142,7 @@ impl World {
         let has_cutouts = stage.materials.iter().any(|m| m.alpha != Alpha::Opaque);
         let (environment, has_sun) = match &surroundings.backdrop {
             Backdrop::None => (None, false),
-            Backdrop::Sky => (Some(Environment::sky()), true),
+            Backdrop::Sky => (Some(Environment::sky(surroundings.ground)), true),
             Backdrop::Environment(map) => (Some(map.clone()), false),
         };
         let ground = Material {
