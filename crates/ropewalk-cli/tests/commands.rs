@@ -388,7 +388,7 @@ fn an_interrupt_of_paths_leaves_whole_pictures() {
     std::fs::write(folder.path().join("four.obj"), FOUR).unwrap();
     let interrupted = |extra: &[&str]| {
         let args = ["render", "four.obj", "--size", "300x200", "--samples", "1000000"];
-        let mut child = Command::new(env!("CARGO_BIN_EXE_ropewalk"))
+        let child = Command::new(env!("CARGO_BIN_EXE_ropewalk"))
             .current_dir(folder.path())
             .args([&args, extra].concat())
             .stderr(Stdio::piped())

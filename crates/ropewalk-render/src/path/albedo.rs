@@ -113,6 +113,9 @@ impl Reflection {
 
     /// The share of light that a dielectric sends back.
     pub fn dielectric(&self, f0: f32, cosine: f32, roughness: f32) -> f32 {
+        if f0 == 0.0 {
+            return 0.0;
+        }
         if roughness < LEAST_ROUGHNESS {
             return fresnel::schlick(f0, cosine);
         }

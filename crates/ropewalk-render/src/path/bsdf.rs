@@ -43,11 +43,14 @@ pub(crate) struct Scattered {
     pub compression: f32,
 }
 
-/// Probabilities of the lobes.
-struct Lobes {
+/// What a direction of view decides: probabilities of the lobes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lobes {
     mirror: f32,
     matte: f32,
     glass: f32,
+    /// Share of light that the coat reflects.
+    coat: f32,
 }
 
 /// The brightness by which lobes and lights are weighed.
@@ -86,7 +89,8 @@ impl Bsdf<'_> {
             || (self.glass > 0.0 && !self.is_clear())
     }
 
-    fn lobes(&self, wo: Vec3) -> Lobes {
+    /// The lobes for a direction of view.
+    pub fn lobes(&self, wo: Vec3) -> Lobes {
         let coat = REFLECTION.dielectric(self.coat_f0(), wo.z, self.roughness);
         // No colour may be left out, so that weights stay bounded.
         let bright = self.base.max_element();
@@ -94,9 +98,9 @@ impl Bsdf<'_> {
         let matte = self.matte * (1.0 - coat) * bright;
         let sum = mirror + matte + self.glass;
         if sum <= 0.0 {
-            return Lobes { mirror: 0.0, matte: 0.0, glass: 0.0 };
+            return Lobes { mirror: 0.0, matte: 0.0, glass: 0.0, coat };
         }
-        Lobes { mirror: mirror / sum, matte: matte / sum, glass: self.glass / sum }
+        Lobes { mirror: mirror / sum, matte: matte / sum, glass: self.glass / sum, coat }
     }
 
     /// Reflectance of metal and coat together, for a facet seen at a cosine.
@@ -111,11 +115,11 @@ impl Bsdf<'_> {
 
     /// The matte layer under the coat, without the cosine: what the coat does not reflect gets in and out (C. Kelemen
     /// and L. Szirmay-Kalos 2001), so that a white one loses nothing.
-    fn matte_value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+    fn matte_value(&self, lobes: &Lobes, wi: Vec3) -> Vec3 {
         let (f0, rough) = (self.coat_f0(), self.roughness);
-        let passes = |w: Vec3| 1.0 - REFLECTION.dielectric(f0, w.z, rough);
+        let (inward, outward) = (1.0 - REFLECTION.dielectric(f0, wi.z, rough), 1.0 - lobes.coat);
         let mean = 1.0 - REFLECTION.dielectric_mean(f0, rough);
-        self.matte * FRAC_1_PI * passes(wo) * passes(wi) / mean * self.base
+        self.matte * FRAC_1_PI * outward * inward / mean * self.base
     }
 
     /// What keeps the energy of glass, over the light of one bounce.
@@ -130,15 +134,14 @@ impl Bsdf<'_> {
 
     /// The BSDF times the cosine of `wi`, and the density with which [`Bsdf::sample`] gives `wi`; without mirrors and
     /// clear glass, which no other way of sampling meets.
-    pub fn evaluate(&self, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
-        let lobes = self.lobes(wo);
+    pub fn evaluate(&self, lobes: &Lobes, wo: Vec3, wi: Vec3) -> (Vec3, f32) {
         if wi.z > 0.0 {
             let (mut value, mut density) = (Vec3::ZERO, 0.0);
             if self.matte > 0.0 {
-                value += self.matte_value(wo, wi) * wi.z;
+                value += self.matte_value(lobes, wi) * wi.z;
                 density += lobes.matte * wi.z * FRAC_1_PI;
             }
-            if !self.is_smooth() {
+            if !self.is_smooth() && lobes.mirror + lobes.glass > 0.0 {
                 let m = (wo + wi).normalize();
                 let (alpha, cosine) = (self.alpha(), wo.dot(m));
                 let shape =
@@ -184,11 +187,10 @@ impl Bsdf<'_> {
     }
 
     /// A direction by the lobes' brightness; `None` where the light is absorbed.
-    pub fn sample(&self, wo: Vec3, u: [f32; 3]) -> Option<Scattered> {
-        let lobes = self.lobes(wo);
+    pub fn sample(&self, lobes: &Lobes, wo: Vec3, u: [f32; 3]) -> Option<Scattered> {
         let place = [u[1], u[2]];
         if u[0] < lobes.matte {
-            return self.spread(wo, cosine_direction(place));
+            return self.spread(lobes, wo, cosine_direction(place));
         }
         let u = u[0] - lobes.matte;
         if u < lobes.mirror {
@@ -197,7 +199,7 @@ impl Bsdf<'_> {
                 return Some(single(Vec3::new(-wo.x, -wo.y, wo.z), weight, 1.0));
             }
             let m = ggx::sample_visible_normal(wo, self.alpha(), place);
-            return self.spread(wo, 2.0 * wo.dot(m) * m - wo).filter(|s| s.wi.z > 0.0);
+            return self.spread(lobes, wo, 2.0 * wo.dot(m) * m - wo).filter(|s| s.wi.z > 0.0);
         }
         if lobes.glass <= 0.0 {
             return None;
@@ -216,7 +218,7 @@ impl Bsdf<'_> {
                 if self.is_clear() {
                     return Some(single(wi, weight * compression * self.tint(), compression));
                 }
-                let out = self.spread(wo, wi).filter(|s| s.wi.z < 0.0)?;
+                let out = self.spread(lobes, wo, wi).filter(|s| s.wi.z < 0.0)?;
                 Some(Scattered { compression, ..out })
             }
             _ => {
@@ -224,15 +226,15 @@ impl Bsdf<'_> {
                 if self.is_clear() {
                     return Some(single(wi, Vec3::splat(weight), 1.0));
                 }
-                self.spread(wo, wi).filter(|s| s.wi.z > 0.0)
+                self.spread(lobes, wo, wi).filter(|s| s.wi.z > 0.0)
             }
         }
     }
 
     /// A direction with the weight of all lobes.
-    fn spread(&self, wo: Vec3, wi: Vec3) -> Option<Scattered> {
+    fn spread(&self, lobes: &Lobes, wo: Vec3, wi: Vec3) -> Option<Scattered> {
         let wi = wi.normalize_or_zero();
-        let (value, density) = self.evaluate(wo, wi);
+        let (value, density) = self.evaluate(lobes, wo, wi);
         let weight = value / density;
         (density > 0.0 && weight.is_finite()).then_some(Scattered {
             wi,

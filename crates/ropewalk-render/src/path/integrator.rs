@@ -11,6 +11,7 @@
 //! Next-event estimation with multiple importance sampling, power heuristic (E. Veach, "Robust Monte Carlo Methods
 //! for Light Transport Simulation", 1997).
 
+use super::bsdf::{Bsdf, Lobes, luminance};
 use super::camera::LensView;
 use super::film::Cell;
 use super::sampler::{Purpose, Sampler, hash, unit_float};
@@ -247,14 +248,17 @@ impl Integrator<'_> {
                 continue;
             }
             let wo = surface.frame.local(-Vec3::from_array(ray.dir)).normalize();
+            let lobes = bsdf.lobes(wo);
             let chance = path.sampler.four(depth, Purpose::Light);
-            if let Some((ray, radiance)) = self.direct_light(&path, &surface, &bsdf, wo, chance) {
+            if let Some((ray, radiance)) =
+                self.direct_light(&path, &surface, (&bsdf, &lobes), wo, chance)
+            {
                 wave.shadow_rays.push(ray);
                 let sampler = path.sampler;
                 wave.pending.push(Pending { cell: path.cell, radiance, sampler });
             }
             let [a, b, c, _] = path.sampler.four(depth, Purpose::Bsdf);
-            let Some(scattered) = bsdf.sample(wo, [a, b, c]) else { continue };
+            let Some(scattered) = bsdf.sample(&lobes, wo, [a, b, c]) else { continue };
             let direction = surface.frame.world(scattered.wi);
             // A smooth normal must not let light through a surface or keep it from being reflected by one.
             if (direction.dot(surface.geometric) > 0.0) != (scattered.wi.z > 0.0) {
@@ -314,7 +318,7 @@ impl Integrator<'_> {
         &self,
         path: &Path,
         surface: &Surface<'_>,
-        bsdf: &super::bsdf::Bsdf<'_>,
+        (bsdf, lobes): (&Bsdf<'_>, &Lobes),
         wo: Vec3,
         u: [f32; 4],
     ) -> Option<(Ray, Vec3)> {
@@ -330,7 +334,7 @@ impl Integrator<'_> {
         if (arriving.direction.dot(surface.geometric) > 0.0) != (wi.z > 0.0) {
             return None;
         }
-        let (value, density) = bsdf.evaluate(wo, wi);
+        let (value, density) = bsdf.evaluate(lobes, wo, wi);
         let weight = match self.strategy {
             _ if arriving.is_single => 1.0,
             Strategy::Lights => 1.0,
@@ -385,7 +389,7 @@ impl Integrator<'_> {
 
     /// Adds light that arrives after so many edges of a path.
     fn add(&self, cell: &mut Cell, edges: u32, radiance: Vec3) {
-        let bright = super::bsdf::luminance(radiance);
+        let bright = luminance(radiance);
         let scale = if edges > 2 && bright > self.clamp { self.clamp / bright } else { 1.0 };
         if radiance.is_finite() {
             cell.radiance += radiance * scale;
