@@ -99,10 +99,10 @@ pub fn build(geometry: &Arc<Geometry>, method: &Method, threads: usize) -> anyho
     Ok(Engine { accelerator, report, build_seconds })
 }
 
-/// Shows a build's progress and passes Ctrl-C on to it.
-struct Watch<'a> {
-    cancel: Arc<AtomicBool>,
-    bar: &'a indicatif::ProgressBar,
+/// Shows the progress of reading or building and passes Ctrl-C on to it.
+pub struct Watch<'a> {
+    pub cancel: Arc<AtomicBool>,
+    pub bar: &'a indicatif::ProgressBar,
 }
 
 impl build::Monitor for Watch<'_> {

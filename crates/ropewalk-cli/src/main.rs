@@ -24,7 +24,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Ray-trace a scene to a picture
-    Render(command::render::Args),
+    Render(Box<command::render::Args>),
     /// Write a scene of the Standard Procedural Databases as NFF
     Scene(command::scene::Args),
     /// Build a tree and print its figures

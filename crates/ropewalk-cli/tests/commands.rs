@@ -194,8 +194,14 @@ fn the_inputs_fault_is_exit_code_1_and_one_sentence() {
 #[test]
 fn a_wrong_use_is_exit_code_2() {
     let folder = tempfile::tempdir().unwrap();
-    let cases: [&[&str]; 16] = [
+    let cases: [&[&str]; 22] = [
         &["render"],
+        &["render", "spd:tetra:2", "--exposure", "1"],
+        &["render", "spd:tetra:2", "--path", "--spd-rules"],
+        &["render", "spd:tetra:2", "--path", "--up", "x"],
+        &["render", "spd:tetra:2", "--path", "--tone", "film"],
+        &["render", "spd:tetra:2", "--path", "--from", "1,2,3"],
+        &["render", "spd:tetra:2", "--path", "--from", "1,2", "--at", "0,0,0"],
         &["render", "spd:tetra:2", "--method", "magic"],
         &["render", "spd:tetra:2", "--size", "0x10"],
         &["render", "spd:tetra:2", "--aov", "heat"],
@@ -349,6 +355,78 @@ fn scenes_of_double_precision_are_shown() {
     assert!(stderr(&output).contains("one of single precision is needed here"));
 }
 
+const FOUR: &str = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+/// Frames that are whole are kept, others are made anew, and are what they would have been.
+#[test]
+fn a_turntable_goes_on_where_it_was_interrupted() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    std::fs::write(place("four.obj"), FOUR).unwrap();
+    let turn = || {
+        let args = "render four.obj --size 24x16 --samples 2 --turntable 3 -o a.png --json";
+        let output = ropewalk(folder.path(), &args.split(' ').collect::<Vec<_>>());
+        assert!(output.status.success(), "{}", stderr(&output));
+        let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+        (json["kept"].as_u64().unwrap(), json["pictures"].as_array().unwrap().len())
+    };
+    assert_eq!(turn(), (0, 3));
+    let names = ["a.0000.png", "a.0001.png", "a.0002.png"];
+    assert_eq!(files(folder.path()), [&names[..], &["four.obj"]].concat());
+    let whole = names.map(|name| std::fs::read(place(name)).unwrap());
+    assert!(whole[0] != whole[1] && whole[1] != whole[2]);
+    std::fs::remove_file(place(names[0])).unwrap();
+    std::fs::write(place(names[2]), &whole[2][..whole[2].len() / 2]).unwrap();
+    assert_eq!(turn(), (1, 2));
+    assert_eq!(names.map(|name| std::fs::read(place(name)).unwrap()), whole);
+    assert_eq!(turn(), (3, 0));
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_of_paths_leaves_whole_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("four.obj"), FOUR).unwrap();
+    let interrupted = |extra: &[&str]| {
+        let args = ["render", "four.obj", "--size", "300x200", "--samples", "1000000"];
+        let child = Command::new(env!("CARGO_BIN_EXE_ropewalk"))
+            .current_dir(folder.path())
+            .args([&args, extra].concat())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_millis(2500));
+        let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(kill.success());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        assert!(stderr(&output).contains("interrupted"), "{}", stderr(&output));
+    };
+    interrupted(&["--turntable", "2", "-o", "frame.png"]);
+    assert_eq!(files(folder.path()), ["four.obj"]);
+    interrupted(&["-o", "a.png"]);
+    let left = files(folder.path());
+    let path = folder.path().join("a.png");
+    assert!(left == ["four.obj"] || ropewalk_render::path::is_whole_picture(&path, [300, 200]));
+    assert!(left.len() <= 2, "{left:?}");
+}
+
+#[test]
+fn a_time_limit_ends_a_picture_with_what_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("four.obj"), FOUR).unwrap();
+    let args = "render four.obj --size 64x64 --seconds 0.2 --environment no.hdr -o a.png --json";
+    let args: Vec<_> = args.split(' ').collect();
+    let output = ropewalk(folder.path(), &args);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stderr(&output).contains("no.hdr: cannot read it"), "{}", stderr(&output));
+    let without: Vec<_> = [&args[..6], &args[8..]].concat();
+    let output = ropewalk(folder.path(), &without);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert!(json["samples"].as_u64().unwrap() >= 1, "{json}");
+}
+
 /// Mesh files are read wherever scenes are, and hit from both sides.
 #[test]
 fn mesh_files_are_rendered_and_timed() {
@@ -360,6 +438,13 @@ fn mesh_files_are_rendered_and_timed() {
     assert!(output.status.success(), "{}", stderr(&output));
     let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     assert!(json["rays"]["primary_hits"].as_u64().unwrap() > 100, "{json}");
+    assert_eq!((&json["method"], &json["samples"]), (&"paths".into(), &64.into()));
+    let share = json["traversal_share"].as_f64().unwrap();
+    assert!(share > 0.0 && share < 1.0 && json["mrays"].as_f64().unwrap() > 0.0, "{json}");
+    let args = ["render", "four.obj", "--size", "40x30", "-o", "b.png", "--whitted", "--json"];
+    let output = ropewalk(folder.path(), &args);
+    let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert!(json["rays"]["refraction"].is_number(), "{json}");
     let args = ["bench", "four.obj", "--side", "16", "--rounds", "1", "--json"];
     let output = ropewalk(folder.path(), &args);
     assert!(output.status.success(), "{}", stderr(&output));

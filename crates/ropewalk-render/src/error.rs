@@ -48,6 +48,18 @@ pub enum RenderError {
         /// Number of materials.
         materials: usize,
     },
+    /// The stage's parts do not belong together.
+    #[error("the stage cannot be rendered: {what}")]
+    Stage {
+        /// What was expected and found.
+        what: String,
+    },
+    /// A picture of the surroundings is unusable.
+    #[error("the environment cannot be used: {what}")]
+    Environment {
+        /// What was expected and found, and in which file.
+        what: String,
+    },
     /// The operating system refused the threads.
     #[error("cannot start {threads} threads: {reason}")]
     Threads {

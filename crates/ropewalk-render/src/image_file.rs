@@ -169,22 +169,50 @@ fn png_bytes(image: &Image) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
+/// The values of one channel, row by row.
+pub(crate) enum Plane {
+    /// Numbers.
+    Float(Vec<f32>),
+    /// Whole numbers.
+    Whole(Vec<u32>),
+}
+
+/// Writes channels as an EXR file, whole or not at all.
+pub(crate) fn write_planes(
+    path: &Path,
+    size: [u32; 2],
+    planes: Vec<(&str, Plane)>,
+) -> Result<(), ImageFileError> {
+    let bytes = plane_bytes(size, planes)
+        .map_err(|reason| ImageFileError::Encode { path: path.into(), reason })?;
+    write_atomically(path, |out| out.write_all(&bytes))
+        .map_err(|source| ImageFileError::Io { path: path.into(), source })
+}
+
 fn exr_bytes(image: &Image, aov: Option<&AovBuffers>) -> Result<Vec<u8>, String> {
-    let plane = |pixels: &[[f32; 3]], c: usize| pixels.iter().map(|p| p[c]).collect::<Vec<_>>();
-    let mut planes: Vec<(&str, Vec<f32>)> = ["R", "G", "B"]
+    let plane = |pixels: &[[f32; 3]], c: usize| Plane::Float(pixels.iter().map(|p| p[c]).collect());
+    let mut planes: Vec<(&str, Plane)> = ["R", "G", "B"]
         .into_iter()
         .enumerate()
         .map(|(c, name)| (name, plane(image.pixels(), c)))
         .collect();
     if let Some(aov) = aov {
-        planes.push(("Z", aov.depth.clone()));
+        planes.push(("Z", Plane::Float(aov.depth.clone())));
         planes.extend(["N.X", "N.Y", "N.Z"].into_iter().zip((0..3).map(|c| plane(&aov.normal, c))));
-        planes.push(("steps", aov.steps.clone()));
-        planes.push(("tests", aov.tests.clone()));
+        planes.push(("steps", Plane::Float(aov.steps.clone())));
+        planes.push(("tests", Plane::Float(aov.tests.clone())));
     }
-    let channels = planes.into_iter().map(|(name, v)| AnyChannel::new(name, FlatSamples::F32(v)));
+    plane_bytes([image.width(), image.height()], planes)
+}
+
+fn plane_bytes(size: [u32; 2], planes: Vec<(&str, Plane)>) -> Result<Vec<u8>, String> {
+    let samples = |plane| match plane {
+        Plane::Float(values) => FlatSamples::F32(values),
+        Plane::Whole(values) => FlatSamples::U32(values),
+    };
+    let channels = planes.into_iter().map(|(name, plane)| AnyChannel::new(name, samples(plane)));
     let layer = Layer::new(
-        (image.width() as usize, image.height() as usize),
+        (size[0] as usize, size[1] as usize),
         LayerAttributes::default(),
         Encoding::FAST_LOSSLESS,
         AnyChannels::sort(channels.collect()),

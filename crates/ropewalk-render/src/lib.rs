@@ -1,5 +1,5 @@
-//! Whitted ray tracing of [`ropewalk_scene`] scenes through any [`ropewalk`] ray caster, by the
-//! rules of the Standard Procedural Databases.
+//! Pictures: Whitted ray tracing of [`ropewalk_scene`] scenes through any [`ropewalk`] ray caster, by the
+//! rules of the Standard Procedural Databases, and path tracing of meshes with materials ([`path`]).
 //!
 //! [`render`] makes a [`Render`]: a picture in linear `f32`, the numbers of rays by kind, the
 //! traversal events, and on request the auxiliary pictures of [`AovBuffers`]. [`record_rays`]
@@ -17,6 +17,7 @@ mod image_file;
 mod light;
 mod observer;
 mod offset;
+pub mod path;
 mod ray_counts;
 mod recorder;
 mod renderer;

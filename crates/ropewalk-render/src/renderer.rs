@@ -40,7 +40,7 @@ pub struct Monitor<'a> {
 }
 
 impl Monitor<'_> {
-    fn is_cancelled(&self) -> bool {
+    pub(crate) fn is_cancelled(&self) -> bool {
         self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 }

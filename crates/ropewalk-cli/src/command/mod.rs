@@ -5,6 +5,7 @@ pub mod build;
 pub mod convert;
 pub mod info;
 mod mesh_info;
+pub mod paths;
 pub mod render;
 pub mod scene;
 pub mod stats;

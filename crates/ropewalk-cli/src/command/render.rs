@@ -1,5 +1,6 @@
 //! `ropewalk render SCENE`
 
+use super::paths;
 use crate::engine;
 use crate::interrupt;
 use crate::output::{PerRay, Rays, Seconds, Tree, print_json, thousands, usage};
@@ -7,7 +8,7 @@ use ropewalk::method::Method;
 use ropewalk_render::{
     AovKind, Monitor, Render, RenderSettings, check_image_path, render, write_image,
 };
-use ropewalk_scene::FacetPolicy;
+use ropewalk_scene::{FacetPolicy, MeshFormat};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -15,38 +16,56 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 pub struct Args {
     /// A .nff, .obj, .ply, .stl, .off, .gltf or .glb file, also gzipped, or a built-in scene such as spd:balls:4
-    scene: String,
+    pub scene: String,
     /// Picture to write: .png or .exr; SCENE.png in this folder if not given
     #[arg(short, long)]
-    output: Option<PathBuf>,
+    pub output: Option<PathBuf>,
     /// Picture size, such as 640x480; the scene's own if not given
     #[arg(long, value_parser = size, conflicts_with = "spd_rules")]
-    size: Option<[u32; 2]>,
-    /// Samples per pixel
-    #[arg(long, default_value_t = 1, conflicts_with = "spd_rules")]
-    samples: u32,
-    /// Largest ray depth, the eye ray being 1
-    #[arg(long, default_value_t = 5)]
-    depth: u32,
-    /// The rules of the database: rays through the pixels' corners, four averaged
+    pub size: Option<[u32; 2]>,
+    /// Samples per pixel; 1 if not given, 64 of paths
+    #[arg(long, conflicts_with = "spd_rules")]
+    pub samples: Option<u32>,
+    /// Largest ray depth, the eye ray being 1; 5 if not given, 16 of paths
     #[arg(long)]
+    pub depth: Option<u32>,
+    /// Rays of mirrors, glass and shadows only (Whitted 1980), as for NFF files and built-in scenes
+    #[arg(long, conflicts_with = "path", help_heading = "Rays of mirrors and glass only")]
+    whitted: bool,
+    /// The rules of the database: rays through the pixels' corners, four averaged
+    #[arg(long, help_heading = "Rays of mirrors and glass only")]
     spd_rules: bool,
     /// Hit all surfaces from both sides; without this opaque ones are hit from their front only, as
     /// the database's rules have it, except in a scene called teapot
-    #[arg(long)]
+    #[arg(long, help_heading = "Rays of mirrors and glass only")]
     two_sided: bool,
     /// How to build and walk; an unknown name lists them all
-    #[arg(long, default_value = Method::DEFAULT)]
-    method: String,
+    #[arg(long, help_heading = "Rays of mirrors and glass only")]
+    method: Option<String>,
     /// Extra pictures beside the first: depth, normal, steps, tests (comma-separated)
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', help_heading = "Rays of mirrors and glass only")]
     aov: Vec<String>,
     /// Threads; 0 is one per core
     #[arg(long, default_value_t = 0)]
-    threads: usize,
+    pub threads: usize,
     /// One JSON object on standard output
     #[arg(long)]
-    json: bool,
+    pub json: bool,
+    #[command(flatten)]
+    pub paths: paths::Options,
+}
+
+impl Args {
+    /// The first option given that only pictures by mirrors and glass have.
+    fn whitted_option(&self) -> Option<&'static str> {
+        let options = [
+            (self.spd_rules, "--spd-rules"),
+            (self.two_sided, "--two-sided"),
+            (self.method.is_some(), "--method"),
+            (!self.aov.is_empty(), "--aov"),
+        ];
+        options.into_iter().find(|(given, _)| *given).map(|(_, name)| name)
+    }
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {
@@ -71,7 +90,17 @@ struct Output {
 
 /// Renders and writes the pictures.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let method = engine::method(&args.method)?;
+    let is_mesh = || MeshFormat::of_name(Path::new(&args.scene)).is_some();
+    if args.paths.path || (!args.whitted && !args.scene.starts_with("spd:") && is_mesh()) {
+        return match args.whitted_option() {
+            Some(name) => Err(usage(format!("{name} needs --whitted: paths do not have it"))),
+            None => paths::run(args),
+        };
+    }
+    if let Some(name) = args.paths.given() {
+        return Err(usage(format!("{name} needs --path: only pictures of paths have it")));
+    }
+    let method = engine::method(args.method.as_deref().unwrap_or(Method::DEFAULT))?;
     let aovs = aovs(&args.aov)?;
     let policy = args.two_sided.then_some(FacetPolicy::TwoSided);
     let loaded = engine::load_as(&args.scene, policy)?;
@@ -83,8 +112,8 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let engine = engine::build(&loaded.geometry, &method, args.threads)?;
     let settings = RenderSettings {
         size: args.size,
-        samples_per_pixel: args.samples,
-        max_depth: args.depth,
+        samples_per_pixel: args.samples.unwrap_or(1),
+        max_depth: args.depth.unwrap_or(5),
         spd_rules: args.spd_rules,
         threads: (args.threads > 0).then_some(args.threads),
         aov: !aovs.is_empty(),

@@ -1,0 +1,8 @@
+//! Path tracing: against closed forms, against itself, and as files.
+
+mod analytic;
+mod common;
+mod furnace;
+mod looks;
+mod strategies;
+mod whole;
