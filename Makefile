@@ -6,7 +6,7 @@ OUT ?= out
 FUZZ_SECONDS ?= 10
 PREFIX ?= /usr/local
 
-.PHONY: help demo test check fmt clippy unit doc inlined c install-c python fuzz bench bench-build bench-python clean
+.PHONY: help demo test check fmt clippy unit doc inlined c install-c python site fuzz bench bench-build bench-python clean
 
 help: ## List the commands
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -25,7 +25,7 @@ demo: tools ## Render a scene to a picture and print what each idea of the 1997 
 	@./target/release/ropewalk paper --scenes gears --size standard --rays 20000 --no-sensitivity -o $(OUT)/paper.html
 	@echo "==> picture: $(OUT)/gears.png   report: $(OUT)/paper.html"
 
-test: tools fmt clippy unit doc inlined c python fuzz ## Everything that CI runs: format, lints, tests, docs, inlining, the C library, the Python package, fuzz
+test: tools fmt clippy unit doc inlined c python site fuzz ## Everything that CI runs: format, lints, tests, docs, inlining, the C library, the Python package, the site, fuzz
 
 fmt: tools
 	@echo "==> format"
@@ -57,6 +57,10 @@ install-c: tools ## Install the C library: header, shared and static library, pk
 python: tools ## Build a wheel of the Python package and test it in fresh virtual environments (needs python3)
 	@echo "==> the Python package"
 	@scripts/test-python
+
+site: ## Build the documentation site into target/site (needs python3)
+	@echo "==> the documentation site"
+	@scripts/site
 
 fuzz: tools ## Fuzz each reader for FUZZ_SECONDS (needs a nightly toolchain)
 	@scripts/fuzz $(FUZZ_SECONDS)

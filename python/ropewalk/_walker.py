@@ -220,7 +220,9 @@ class Walker:
             directions: shape (S, 3).
             lengths: (S,), or a number.
             stop: particles stop at the first face that they meet and leave out the rest of their list.
-            masks, skip, faces: as for :meth:`advance`.
+            masks: as for :meth:`advance`.
+            skip: as for :meth:`advance`.
+            faces: as for :meth:`advance`.
 
         Raises:
             ArgumentError, ArgumentTypeError: as :class:`Walker`.

@@ -94,7 +94,7 @@ def test_examples(module):
     assert result.attempted > 0 and result.failed == 0
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/python.md", "docs/coming-from.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/python.md", "docs/coming-from.md"])
 def test_code_of_the_pages(page, tmp_path, monkeypatch):
     # Some of it writes files.
     text = pathlib.Path(__file__).parents[2].joinpath(page).read_text()
