@@ -1,6 +1,6 @@
 //! Triangle meshes from files: OBJ, PLY, STL, OFF and glTF 2.0, plain or gzipped.
 //!
-//! [`Mesh`] reads positions and faces, [`Stage`](crate::Stage) what a file says of looks too. Whatever a file announces is
+//! [`Mesh`] reads positions and faces, [`Stage`] what a file says of looks too. Whatever a file announces is
 //! checked against its size before memory is taken for it, and every error says where it is and what was expected there.
 //! Large binary files are read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong.
 
