@@ -6,7 +6,8 @@ pub(crate) use stored::{BACK, FRONT, StoredTriangles, TRIANGLE_BYTES};
 
 use crate::aabb::Aabb;
 use crate::primitive::{Crossing, Primitive, Shape, ShapeError, Sides, SurfaceNormals, Triangle};
-use crate::ray::{Hit, PreparedRay, Ray};
+use crate::ray::{Hit, PreparedRay, Ray, Shear};
+use crate::touch;
 use std::sync::Arc;
 
 /// Why a primitive was refused.
@@ -223,6 +224,25 @@ impl Geometry {
         };
         let Crossing { t, u, v } = crossing;
         Some(Hit { t, prim_id, u, v })
+    }
+
+    /// All hits of a ray in order, found by going through all primitives: the definition of what
+    /// [`BatchCaster::all_hits`](crate::kernel::BatchCaster::all_hits) answers.
+    pub fn all_hits(&self, ray: &Ray) -> Vec<Hit> {
+        let Some(prepared) = PreparedRay::new(ray) else { return Vec::new() };
+        let prims = 0..self.len() as u32;
+        let mut hits: Vec<Hit> = prims.filter_map(|id| self.intersect(id, &prepared)).collect();
+        hits.sort_by(|a, b| (a.t + 0.0).total_cmp(&(b.t + 0.0)).then(a.prim_id.cmp(&b.prim_id)));
+        self.leave_out(ray, &mut hits);
+        hits
+    }
+
+    /// Leaves out of all hits of a valid ray, or of those that a filter accepts, in order, the triangles beside its way where it meets
+    /// an edge or a vertex: which do not count in lists (docs/numerics.md). True if there were any.
+    pub fn leave_out(&self, ray: &Ray, hits: &mut Vec<Hit>) -> bool {
+        let triangle =
+            |hit: &Hit| Some(self.triangle(hit.prim_id)?.vertices.map(|p| p.map(f64::from)));
+        touch::leave_out(hits, &Shear::new(ray), |a, b| touch::tie(a.t, b.t), triangle)
     }
 
     /// The normals at a hit of `ray`.

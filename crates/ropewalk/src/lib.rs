@@ -19,6 +19,7 @@ pub mod point;
 pub mod primitive;
 pub mod ray;
 pub mod rope;
+mod touch;
 pub mod traverse;
 pub mod tree;
 pub mod walker;

@@ -13,8 +13,8 @@ use crate::harness::Engine;
 use crate::own::{TaB, Wave};
 use crate::scene::Mesh;
 use crate::workload::Random;
-use ropewalk::Ray;
 use ropewalk::kernel::Level;
+use ropewalk::{Hit, Ray};
 use std::collections::BTreeMap;
 use std::ops::AddAssign;
 
@@ -200,7 +200,10 @@ impl<'a> Campaign<'a> {
             let mut hits = lists.of(ray).to_vec();
             hits.iter_mut().for_each(|h| h.t += 0.0);
             hits.sort_unstable_by(BenchHit::order);
-            hits.iter().map(|h| (h.t.to_bits(), h.prim)).collect()
+            let hit = |h: &BenchHit| Hit { t: h.t, prim_id: h.prim, u: 0.0, v: 0.0 };
+            let mut hits: Vec<Hit> = hits.iter().map(hit).collect();
+            self.wave.geometry().leave_out(&rays[ray], &mut hits);
+            hits.iter().map(|h| (h.t.to_bits(), h.prim_id)).collect()
         };
         (0..rays.len()).map(row).collect()
     }

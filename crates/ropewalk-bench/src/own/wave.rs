@@ -51,6 +51,11 @@ impl Wave {
         Ok(Wave { geometry: Arc::new(geometry), tree: Arc::new(tree) })
     }
 
+    /// The triangles.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
     /// The tree.
     pub fn tree(&self) -> &WideTree {
         &self.tree

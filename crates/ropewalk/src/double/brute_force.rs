@@ -24,6 +24,7 @@ impl DoubleBruteForce<'_> {
     pub fn all_hits(&self, ray: &DoubleRay) -> Vec<DoubleHit> {
         let mut hits: Vec<DoubleHit> = self.hits(ray).collect();
         DoubleHit::sort(&mut hits);
+        self.geometry.leave_out(ray, &mut hits);
         hits
     }
 

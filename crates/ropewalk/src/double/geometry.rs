@@ -7,6 +7,7 @@ use crate::geometry::{Geometry, GeometryError};
 use crate::point::expansion::Expansion;
 use crate::primitive::{Sides, Triangle};
 use crate::ray::Shear;
+use crate::touch;
 use crate::wide::WideTree;
 
 /// Why a mesh was refused.
@@ -223,6 +224,14 @@ impl DoubleGeometry {
             u: met.u,
             v: met.v,
         })
+    }
+
+    /// Leaves out of all hits of a ray, or of those that a filter accepts, in order, the triangles beside its way where it meets an
+    /// edge or a vertex: which do not count in lists (docs/numerics.md). True if there were any.
+    pub fn leave_out(&self, ray: &DoubleRay, hits: &mut Vec<DoubleHit>) -> bool {
+        let frame = Shear::along(&ray.origin, &ray.dir);
+        let tie = |a: &DoubleHit, b: &DoubleHit| touch::double_tie(a.t, b.t);
+        touch::leave_out(hits, &frame, tie, |hit| self.triangle(hit.prim_id))
     }
 
     /// The triangles of the search.

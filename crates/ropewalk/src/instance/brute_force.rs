@@ -1,7 +1,7 @@
 //! The definition of the answers: every triangle of every instance.
 
 use super::{InstanceHit, InstancedScene};
-use crate::double::DoubleRay;
+use crate::double::{DoubleBruteForce, DoubleRay};
 
 /// Answers rays by testing all triangles of all instances.
 #[derive(Clone, Copy)]
@@ -16,11 +16,12 @@ impl InstanceBruteForce<'_> {
         let mut hits = Vec::new();
         for (instance, placed) in self.scene.instances().iter().enumerate() {
             let ray = placed.transform.ray_to_object(ray);
-            for prim_id in 0..placed.object.geometry.len() as u32 {
-                if let Some(hit) = placed.object.geometry.intersect(prim_id, &ray) {
-                    hits.push(InstanceHit { t: hit.t, instance: instance as u32, prim_id });
-                }
-            }
+            let of_object = DoubleBruteForce { geometry: &placed.object.geometry }.all_hits(&ray);
+            hits.extend(of_object.iter().map(|hit| InstanceHit {
+                t: hit.t,
+                instance: instance as u32,
+                prim_id: hit.prim_id,
+            }));
         }
         hits.sort_unstable_by(InstanceHit::order);
         hits

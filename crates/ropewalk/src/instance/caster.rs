@@ -311,7 +311,8 @@ impl<F: InstanceFilter> InstanceCaster<'_, F> {
         let lines: Vec<DoubleRay> = rays.iter().map(whole).collect();
         let caster = DoubleCaster::new(&top.tree, &top.geometry).with_threads(1);
         let caster = caster.with_level(self.level).expect("the level has been checked");
-        let walls = caster.all_hits(&lines);
+        // Also of boxes that the ray only touches.
+        let walls = caster.all_touched(&lines);
         let mut row: Vec<Visit> = Vec::new();
         for (i, ray) in rays.iter().enumerate() {
             row.clear();

@@ -26,6 +26,7 @@ use crate::geometry::Geometry;
 use crate::point::Cell;
 use crate::point::cells::locate;
 use crate::ray::{Hit, PreparedRay, Ray};
+use crate::touch::tie;
 use crate::wide::WideTree;
 use rayon::prelude::*;
 
@@ -150,14 +151,33 @@ impl<'a> Engine<'a> {
     pub fn count_hits(&self, rays: &[Ray]) -> Vec<u32> {
         let mut counts = vec![0; rays.len()];
         if self.is_serial(rays) {
-            self.run(rays, 0, &mut Count::new(&mut counts, WAVE));
+            self.count(rays, 0, &mut counts);
             return counts;
         }
         let chunks = rays.par_chunks(TASK).zip(counts.par_chunks_mut(TASK));
-        chunks.enumerate().for_each(|(i, (rays, counts))| {
-            self.run(rays, i * TASK, &mut Count::new(counts, WAVE));
-        });
+        chunks.enumerate().for_each(|(i, (rays, counts))| self.count(rays, i * TASK, counts));
         counts
+    }
+
+    fn count(&self, rays: &[Ray], first_ray: usize, counts: &mut [u32]) {
+        let mut count = Count::new(counts, self.geometry, WAVE);
+        self.run(rays, first_ray, &mut count);
+        for ray in count.into_unsure() {
+            let index = ray as usize;
+            counts[index] = self.list(&rays[index], first_ray + index).len() as u32;
+        }
+    }
+
+    /// All hits of a ray that count, by itself; `index` is its number in the batch.
+    fn list(&self, ray: &Ray, index: usize) -> Vec<Hit> {
+        let mut every = Every::default();
+        every.start(usize::MAX, 1, WAVE);
+        self.run(std::slice::from_ref(ray), index, &mut every);
+        let (mut t, mut prim_id) = (vec![0.0; every.len()], vec![0; every.len()]);
+        every.copy(0, &mut [0], &mut t, &mut prim_id);
+        let mut hits = hits_of(&t, &prim_id);
+        self.geometry.leave_out(ray, &mut hits);
+        hits
     }
 
     pub fn first_hits_into(&self, rays: &[Ray], k: usize, all: &mut AllHits) {
@@ -205,6 +225,54 @@ impl<'a> Engine<'a> {
         } else {
             rows.collect::<Vec<_>>().into_par_iter().for_each(copy);
         }
+        self.leave_out(rays, k, all);
+    }
+
+    /// Leaves out of the first `k` hits of rays what does not count; see [`touch`](crate::touch).
+    fn leave_out(&self, rays: &[Ray], k: usize, all: &mut AllHits) {
+        let settle = |i: usize| {
+            let row = all.offsets[i]..all.offsets[i + 1];
+            let t = &all.t[row.clone()];
+            if !t.windows(2).any(|pair| tie(pair[0], pair[1])) {
+                return None;
+            }
+            let mut hits = hits_of(t, &all.prim_id[row]);
+            if !self.geometry.leave_out(&rays[i], &mut hits) {
+                return None;
+            }
+            if t.len() == k {
+                // There may be others in their place.
+                hits = self.list(&rays[i], i);
+                hits.truncate(k);
+            }
+            Some((i, hits))
+        };
+        let changed: Vec<(usize, Vec<Hit>)> = if self.is_serial(rays) {
+            (0..rays.len()).filter_map(settle).collect()
+        } else {
+            (0..rays.len()).into_par_iter().with_min_len(TASK).filter_map(settle).collect()
+        };
+        if changed.is_empty() {
+            return;
+        }
+        let (mut changed, mut from, mut to) = (changed.iter().peekable(), 0, 0);
+        for i in 0..rays.len() {
+            let end = all.offsets[i + 1];
+            if let Some((_, hits)) = changed.next_if(|(ray, _)| *ray == i) {
+                for (j, hit) in hits.iter().enumerate() {
+                    (all.t[to + j], all.prim_id[to + j]) = (hit.t, hit.prim_id);
+                }
+                to += hits.len();
+            } else {
+                all.t.copy_within(from..end, to);
+                all.prim_id.copy_within(from..end, to);
+                to += end - from;
+            }
+            from = end;
+            all.offsets[i + 1] = to;
+        }
+        all.t.truncate(to);
+        all.prim_id.truncate(to);
     }
 
     pub fn closest_hit_events(&self, rays: &[Ray]) -> BatchEvents {
@@ -487,6 +555,12 @@ impl<'a> Engine<'a> {
         };
         if skipped as f64 >= WORTHWHILE * sample as f64 { way } else { Way::Root }
     }
+}
+
+/// A row as hits without weights.
+fn hits_of(t: &[f32], prim_id: &[u32]) -> Vec<Hit> {
+    let hit = |(&t, &prim_id)| Hit { t, prim_id, u: 0.0, v: 0.0 };
+    t.iter().zip(prim_id).map(hit).collect()
 }
 
 /// Ends, parameters and primitives of the rows of some rays.

@@ -14,7 +14,7 @@ pub use cone::Cone;
 pub use patch::Patch;
 pub use polygon::{EDGE_TOLERANCE, Polygon};
 pub use sphere::Sphere;
-pub(crate) use triangle::EDGE_FILTER;
+pub(crate) use triangle::{EDGE_FILTER, edge_exactly};
 pub use triangle::{Meeting, Triangle};
 
 use crate::aabb::Aabb;

@@ -52,6 +52,17 @@ impl Triangle {
         [exact_orientation(p, 1, 2), exact_orientation(p, 2, 0), exact_orientation(p, 0, 1)]
     }
 
+    /// The vertex whose coordinates are `at(axis)` as the ray of a frame sees it: sheared across, and its depth.
+    #[inline(always)]
+    pub(crate) fn corner<T: Into<f64>>(at: impl Fn(usize) -> T, frame: &Shear) -> [f64; 3] {
+        let [kx, ky, kz] = frame.k;
+        let [sx, sy, _] = frame.shear;
+        let dz = at(kz).into() - frame.origin[2];
+        let dx = at(kx).into() - frame.origin[0];
+        let dy = at(ky).into() - frame.origin[1];
+        [dx - sx * dz, dy - sy * dz, dz]
+    }
+
     fn unit_normal(&self) -> [f64; 3] {
         let n = self.scaled_normal();
         let len = length(n);
@@ -71,14 +82,8 @@ impl Triangle {
         frame: &Shear,
         sides: Sides,
     ) -> Option<Meeting> {
-        let [kx, ky, kz] = frame.k;
-        let [sx, sy, sz] = frame.shear;
-        let corner = |i: usize| {
-            let dz = at(i, kz).into() - frame.origin[2];
-            let dx = at(i, kx).into() - frame.origin[0];
-            let dy = at(i, ky).into() - frame.origin[1];
-            [dx - sx * dz, dy - sy * dz, dz]
-        };
+        let sz = frame.shear[2];
+        let corner = |i: usize| Self::corner(|axis| at(i, axis), frame);
         let (a, b, c) = (corner(0), corner(1), corner(2));
         // Edge functions: no fused operations, or the two triangles of an edge would differ.
         let (mut u, mut v, mut w) = (edge(c, b), edge(a, c), edge(b, a));
@@ -142,7 +147,7 @@ fn edge(p: [f64; 3], q: [f64; 3]) -> f64 {
 
 /// The same without rounding the products; antisymmetric too.
 #[cold]
-fn edge_exactly(p: [f64; 3], q: [f64; 3]) -> f64 {
+pub(crate) fn edge_exactly(p: [f64; 3], q: [f64; 3]) -> f64 {
     let (a, b) = (p[0] * q[1], p[1] * q[0]);
     (a - b) + (p[0].mul_add(q[1], -a) - p[1].mul_add(q[0], -b))
 }

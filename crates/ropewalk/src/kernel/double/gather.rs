@@ -142,14 +142,23 @@ impl Every {
         Every { first, known, bounds, row, hits, range: vec![(0, 0); rays] }
     }
 
-    /// Hits of all rays together.
-    pub fn len(&self) -> usize {
-        self.hits.len()
+    /// The hits of a ray, in order.
+    pub fn row(&self, ray: usize) -> &[(f64, u32)] {
+        let (start, len) = self.range[ray];
+        &self.hits[start..start + len]
     }
 
-    /// The hits of each ray, in order.
+    /// Those of each ray.
     pub fn rows(&self) -> impl Iterator<Item = &[(f64, u32)]> {
-        self.range.iter().map(|&(start, len)| &self.hits[start..start + len])
+        (0..self.range.len()).map(|ray| self.row(ray))
+    }
+
+    /// Puts hits in the place of those of a ray, no more than there were.
+    pub fn shorten(&mut self, ray: usize, hits: impl ExactSizeIterator<Item = (f64, u32)>) {
+        let (start, len) = &mut self.range[ray];
+        debug_assert!(hits.len() <= *len);
+        *len = hits.len();
+        self.hits[*start..*start + *len].iter_mut().zip(hits).for_each(|(to, hit)| *to = hit);
     }
 
     /// Puts the hits of a ray in order, each once, and keeps the first few.

@@ -10,6 +10,7 @@ use super::level::Level;
 use super::query::NoFilter;
 use crate::double::{DoubleGeometry, DoubleHit, DoubleRay, DoubleTree, Narrowed, Place};
 use crate::ray::Ray;
+use crate::touch::double_tie;
 use decide::Decide;
 use gather::{Any, Closest, Every, Gather};
 use rayon::prelude::*;
@@ -156,6 +157,11 @@ impl<'a, F: DoubleFilter> DoubleCaster<'a, F> {
         self.ask(|asker| asker.closest_hit_events(rays))
     }
 
+    /// All triangles that each ray meets or touches, in order: also those that do not count in lists.
+    pub(crate) fn all_touched(&self, rays: &[DoubleRay]) -> DoubleAllHits {
+        self.ask(|asker| asker.lists(rays, usize::MAX, |_, _, every| every))
+    }
+
     fn with_engine(self, engine: Engine<'a>) -> Self {
         DoubleCaster { asker: Asker { engine, ..self.asker }, ..self }
     }
@@ -195,7 +201,8 @@ impl Asker<'_> {
     fn count_hits(&self, rays: &[DoubleRay]) -> Vec<u32> {
         let mut counts = vec![0; rays.len()];
         self.each(rays, counts.chunks_mut(TASK).collect(), |rays, first, counts: &mut [u32]| {
-            let every = self.run(rays, first, Every::new(usize::MAX, rays.len()), &mut NoEvents);
+            let every = self.every(rays, first, usize::MAX);
+            let every = self.leave_out(rays, first, usize::MAX, every);
             for (count, hits) in counts.iter_mut().zip(every.rows()) {
                 *count = hits.len() as u32;
             }
@@ -204,6 +211,45 @@ impl Asker<'_> {
     }
 
     fn first_hits(&self, rays: &[DoubleRay], k: usize) -> DoubleAllHits {
+        self.lists(rays, k, |rays, first, every| self.leave_out(rays, first, k, every))
+    }
+
+    /// The first `k` hits of rays, the first of which is `first_ray` in the batch.
+    fn every(&self, rays: &[DoubleRay], first_ray: usize, k: usize) -> Every {
+        self.run(rays, first_ray, Every::new(k, rays.len()), &mut NoEvents)
+    }
+
+    /// Leaves out of the first `k` hits of rays what does not count; see [`touch`](crate::touch).
+    fn leave_out(&self, rays: &[DoubleRay], first_ray: usize, k: usize, mut every: Every) -> Every {
+        let hit = |&(t, prim_id): &(f64, u32)| DoubleHit { t, prim_id, u: 0.0, v: 0.0 };
+        for (i, ray) in rays.iter().enumerate() {
+            let row = every.row(i);
+            if !row.windows(2).any(|pair| double_tie(pair[0].0, pair[1].0)) {
+                continue;
+            }
+            let mut hits: Vec<DoubleHit> = row.iter().map(hit).collect();
+            if !self.geometry.leave_out(ray, &mut hits) {
+                continue;
+            }
+            if row.len() == k {
+                // There may be others in their place.
+                let whole = self.every(&rays[i..=i], first_ray + i, usize::MAX);
+                hits = whole.row(0).iter().map(hit).collect();
+                self.geometry.leave_out(ray, &mut hits);
+                hits.truncate(k);
+            }
+            every.shorten(i, hits.iter().map(|hit| (hit.t, hit.prim_id)));
+        }
+        every
+    }
+
+    /// The first `k` hits of each ray, each task's after a last touch.
+    fn lists(
+        &self,
+        rays: &[DoubleRay],
+        k: usize,
+        settle: impl Fn(&[DoubleRay], usize, Every) -> Every + Sync,
+    ) -> DoubleAllHits {
         let mut offsets = Vec::with_capacity(rays.len() + 1);
         offsets.push(0);
         let (mut t, mut prim_id) = (Vec::new(), Vec::new());
@@ -212,10 +258,9 @@ impl Asker<'_> {
             return DoubleAllHits { offsets, t, prim_id };
         }
         let tasks = vec![(); rays.len().div_ceil(TASK)];
-        let parts = self.each(rays, tasks, |rays, first, ()| {
-            self.run(rays, first, Every::new(k, rays.len()), &mut NoEvents)
-        });
-        let total = parts.iter().map(Every::len).sum();
+        let parts = self
+            .each(rays, tasks, |rays, first, ()| settle(rays, first, self.every(rays, first, k)));
+        let total = parts.iter().flat_map(Every::rows).map(<[_]>::len).sum();
         t.reserve_exact(total);
         prim_id.reserve_exact(total);
         for part in &parts {
