@@ -174,12 +174,13 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
         self.ask(|engine| engine.occluded_one(ray))
     }
 
-    /// The number of primitives that each ray hits.
+    /// The number of hits that [`BatchCaster::all_hits`] lists for each ray.
     pub fn count_hits(&self, rays: &[Ray]) -> Vec<u32> {
         self.ask(|engine| engine.count_hits(rays))
     }
 
-    /// All hits of each ray, in order, each once.
+    /// All hits of each ray, in order, each once. Where a ray meets an edge or a vertex exactly, each crossing of the surface
+    /// there has one, not each triangle (docs/numerics.md); [`Geometry::all_hits`] is the definition.
     pub fn all_hits(&self, rays: &[Ray]) -> AllHits {
         self.first_hits(rays, usize::MAX)
     }

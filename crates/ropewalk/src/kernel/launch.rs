@@ -46,7 +46,6 @@ pub fn run_wave<Q: BatchQuery, S: Source<Q>, E: Events, const SHAPES: bool>(
 }
 
 /// One ray by itself; see [`single`].
-#[inline(always)]
 pub fn run_single<Q: BatchQuery, E: Events, const SHAPES: bool>(
     level: Level,
     leaves: &Leaves<'_>,

@@ -137,12 +137,12 @@ impl<'a, F: DoubleFilter> DoubleCaster<'a, F> {
         self.ask(|asker| asker.occluded_into(rays, hit));
     }
 
-    /// The number of triangles that each ray hits.
+    /// The number of hits that [`DoubleCaster::all_hits`] lists for each ray.
     pub fn count_hits(&self, rays: &[DoubleRay]) -> Vec<u32> {
         self.ask(|asker| asker.count_hits(rays))
     }
 
-    /// All hits of each ray, in order, each once.
+    /// All hits of each ray, in order, each once; at edges and vertices each crossing once (docs/numerics.md).
     pub fn all_hits(&self, rays: &[DoubleRay]) -> DoubleAllHits {
         self.first_hits(rays, usize::MAX)
     }
@@ -243,7 +243,7 @@ impl Asker<'_> {
         every
     }
 
-    /// The first `k` hits of each ray, each task's after a last touch.
+    /// The first `k` hits of each ray, once `settle` is done with those of each task.
     fn lists(
         &self,
         rays: &[DoubleRay],
