@@ -156,6 +156,9 @@ class RayMethods:
     ) -> HitLists:
         """Every hit of each ray, in order; each primitive at most once, where the ray first hits it.
 
+        Where a ray meets an edge or a vertex exactly, each crossing of the surface there is listed once, not each
+        triangle, so that closed surfaces are entered as often as they are left.
+
         Arguments and errors are those of :meth:`closest_hit`.
 
         Raises:
@@ -212,7 +215,7 @@ class RayMethods:
         threads: int = 0,
         strict: bool = False,
     ) -> NDArray[np.int32]:
-        """The number of primitives that each ray hits: int32, in the rays' shape.
+        """The number of hits that :meth:`all_hits` lists for each ray: int32, in the rays' shape.
 
         Arguments and errors are those of :meth:`closest_hit`; it agrees with ``all_hits(...).counts``.
 

@@ -245,6 +245,17 @@ impl Geometry {
         touch::leave_out(hits, &Shear::new(ray), |a, b| touch::tie(a.t, b.t), triangle)
     }
 
+    /// False if [`Geometry::leave_out`] would leave out none of the hits with these parameters and primitives.
+    pub(crate) fn may_leave_out(&self, ray: &Ray, t: &[f32], prim_id: &[u32]) -> bool {
+        let tie = |i: usize, j: usize| touch::tie(t[i], t[j]);
+        if !(1..t.len()).any(|i| tie(i - 1, i)) {
+            return false;
+        }
+        let triangle =
+            |i: usize| Some(self.triangle(prim_id[i])?.vertices.map(|p| p.map(f64::from)));
+        touch::concerns(t.len(), &Shear::new(ray), tie, triangle)
+    }
+
     /// The normals at a hit of `ray`.
     ///
     /// # Panics

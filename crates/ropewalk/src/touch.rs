@@ -65,6 +65,31 @@ impl Outline {
     }
 }
 
+/// True if two of `n` hits in order tie and touch an edge or a vertex each: others are for certain to stay. Coincident triangles tie
+/// all along, so this is asked before anything is set up.
+pub fn concerns(
+    n: usize,
+    frame: &Shear,
+    tie: impl Fn(usize, usize) -> bool,
+    triangle: impl Fn(usize) -> Option<[[f64; 3]; 3]>,
+) -> bool {
+    let touches = |i: usize| triangle(i).is_some_and(|t| Outline::new(frame, t).is_some());
+    // Those of the run of ties so far that touch something.
+    let mut touching = None;
+    for i in 1..n {
+        if tie(i - 1, i) {
+            let touching = touching.get_or_insert_with(|| usize::from(touches(i - 1)));
+            *touching += usize::from(touches(i));
+            if *touching > 1 {
+                return true;
+            }
+        } else {
+            touching = None;
+        }
+    }
+    false
+}
+
 /// Leaves out of the hits of a ray, which are in order, those that do not count; true if there were any.
 ///
 /// `tie` says of two in turn whether their parameters may be one but for rounding. Only for such the triangle is asked for; what is

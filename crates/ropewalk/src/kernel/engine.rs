@@ -26,7 +26,6 @@ use crate::geometry::Geometry;
 use crate::point::Cell;
 use crate::point::cells::locate;
 use crate::ray::{Hit, PreparedRay, Ray};
-use crate::touch::tie;
 use crate::wide::WideTree;
 use rayon::prelude::*;
 
@@ -232,11 +231,11 @@ impl<'a> Engine<'a> {
     fn leave_out(&self, rays: &[Ray], k: usize, all: &mut AllHits) {
         let settle = |i: usize| {
             let row = all.offsets[i]..all.offsets[i + 1];
-            let t = &all.t[row.clone()];
-            if !t.windows(2).any(|pair| tie(pair[0], pair[1])) {
+            let (t, prim_id) = (&all.t[row.clone()], &all.prim_id[row]);
+            if !self.geometry.may_leave_out(&rays[i], t, prim_id) {
                 return None;
             }
-            let mut hits = hits_of(t, &all.prim_id[row]);
+            let mut hits = hits_of(t, prim_id);
             if !self.geometry.leave_out(&rays[i], &mut hits) {
                 return None;
             }

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 /// Error: the ray is moved to its closest point to the frustum's middle, which is off by at most
 /// `2^-50` of the distance; `t` is off by as much over the cosine at which the ray meets the
 /// surface, and is then rounded once to `f32`. Within that distance of a rim or of a tangent it is
-/// undecided whether there is a hit.
+/// undecided whether there is a hit, and so it is within `2^-26` of the cone's size of its tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cone {
     /// Centre of the base.
@@ -29,6 +29,12 @@ pub struct Cone {
 /// Slack of computed coordinates, as a share of the coordinates and radii that enter: fewer than
 /// 64 roundings of 2^-53, trigonometric functions included.
 const SLACK: f64 = 1.0 / (1u64 << 47) as f64;
+
+/// How far a hit may lie beside the surface, as a share of what it was computed from: 32 roundings.
+const ON_SURFACE: f64 = 1.0 / (1u64 << 48) as f64;
+
+/// Each doubles the number of digits, and a root has eight at least.
+const NEWTON_STEPS: usize = 3;
 
 /// Rounds of the clip: each narrows the piece by the box of the one before.
 const CLIP_ROUNDS: usize = 3;
@@ -67,6 +73,34 @@ impl Cone {
         let radius = f64::from(self.base_radius);
         Frame { base, axis, radius, growth: f64::from(self.apex_radius) - radius }
     }
+}
+
+/// The parameter near a root `tau` where a ray is on the surface, as far as `f64` can tell: where its distance from the axis is the
+/// radius there, within [`ON_SURFACE`] of what enters.
+///
+/// Squares lose half of the digits where both are small, so near tips, and along generators, a root of the quadratic may be a
+/// hundred millionth of the cone away from it; the walks rely on `HIT_ERROR`. `None` for the mirrored nappe, and within as
+/// little of a tip where no step helps.
+fn settled(tau: f64, (p0, p1): (DVec3, DVec3), (r0, r1): (f64, f64)) -> Option<f64> {
+    let off = |tau: f64| {
+        let p = p0 + tau * p1;
+        let distance = p.length();
+        (distance - (r0 + tau * r1), p.dot(p1) / distance - r1)
+    };
+    let (mut tau, (mut error, mut slope)) = (tau, off(tau));
+    let size = |tau: f64| p0.length() + r0.abs() + tau.abs() * (p1.length() + r1.abs());
+    for _ in 0..NEWTON_STEPS {
+        if error.abs() <= ON_SURFACE * size(tau) {
+            return Some(tau);
+        }
+        let next = tau - error / slope;
+        let (next_error, next_slope) = off(next);
+        if next_error.is_nan() || next_error.abs() >= error.abs() {
+            return None;
+        }
+        (tau, error, slope) = (next, next_error, next_slope);
+    }
+    (error.abs() <= ON_SURFACE * size(tau)).then_some(tau)
 }
 
 fn vector(p: [f32; 3]) -> DVec3 {
@@ -330,13 +364,14 @@ impl Primitive for Cone {
         let roots =
             if b < 0.0 { [(c / q, -root), (q / a, root)] } else { [(q / a, -root), (c / q, root)] };
         let ordered = if roots[1].0 < roots[0].0 { [roots[1], roots[0]] } else { roots };
+        let within = |tau: f64| (0.0..=1.0).contains(&(0.5 + (s0 + tau * s1)));
         ordered.into_iter().find_map(|(tau, facing)| {
-            let share = 0.5 + (s0 + tau * s1);
             // A NaN root (no quadratic term) fails this test, and so does the mirrored nappe,
             // which lies beyond the apex.
-            if !(0.0..=1.0).contains(&share) || !sides.accepts(facing) {
+            if !within(tau) || !sides.accepts(facing) {
                 return None;
             }
+            let tau = settled(tau, (p0, p1), (r0, r1)).filter(|&tau| within(tau))?;
             Crossing::in_range(ray, shift + tau)
         })
     }
