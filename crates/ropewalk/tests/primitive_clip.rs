@@ -1,6 +1,7 @@
 //! Bounds and clips of every primitive: conservative, inside cell and bounds, tight.
 
-use ropewalk::primitive::{HIT_ERROR, Primitive, Sphere, Triangle};
+use glam::DVec3;
+use ropewalk::primitive::{Cone, HIT_ERROR, Primitive, Sphere, Triangle};
 use ropewalk::ray::PreparedRay;
 use ropewalk::{Aabb, Ray, Shape, Sides};
 use ropewalk_testkit::primitives::{Kind, Sample, Space, cell_around, sample};
@@ -63,6 +64,51 @@ fn clips_hold_every_surface_point_of_the_cell() {
             }
         }
     }
+}
+
+/// What lies beside the axis is roundings there, and which way they point must not matter.
+#[test]
+fn cells_with_their_middle_on_the_axis_of_a_cone() {
+    let mut draw = Draw::new(12);
+    let mut inside = 0;
+    for _ in 0..3000 {
+        let eighth = |draw: &mut Draw, n: usize| (1 + draw.below(n)) as f32 / 8.0;
+        let (base, apex) = (draw.grid_point(3), draw.grid_point(3));
+        let (base_radius, apex_radius) = (eighth(&mut draw, 8), eighth(&mut draw, 8));
+        let cone = Cone { base, apex, base_radius, apex_radius };
+        if cone.is_degenerate() {
+            continue;
+        }
+        let point = |share: f32| {
+            DVec3::from_array(std::array::from_fn(|a| {
+                f64::from(base[a]) + f64::from(share) * (f64::from(apex[a]) - f64::from(base[a]))
+            }))
+        };
+        let (middle, half) = (point(eighth(&mut draw, 7)), [0; 3].map(|_| eighth(&mut draw, 8)));
+        let at = middle.to_array().map(|x| x as f32);
+        let cell = Aabb {
+            min: std::array::from_fn(|a| at[a] - half[a]),
+            max: std::array::from_fn(|a| at[a] + half[a]),
+        };
+        let clip = cone.clipped_bounds(&cell);
+        let axis = (point(1.0) - point(0.0)).normalize();
+        let (u, v) = axis.any_orthonormal_pair();
+        for _ in 0..20 {
+            let (share, angle) = (draw.uniform(0.0, 1.0), draw.uniform(0.0, std::f64::consts::TAU));
+            let radius =
+                f64::from(base_radius) + share * (f64::from(apex_radius) - f64::from(base_radius));
+            let p = point(0.0) + share * (point(1.0) - point(0.0));
+            let p = (p + radius * (u * angle.cos() + v * angle.sin())).to_array();
+            let margin =
+                |a: usize| (p[a] - f64::from(cell.min[a])).min(f64::from(cell.max[a]) - p[a]);
+            if (0..3).all(|a| margin(a) > 1e-9) {
+                inside += 1;
+                let clip = clip.unwrap_or_else(|| panic!("lost {cone:?} in {cell:?} at {p:?}"));
+                assert!(outside(&clip, p) <= 1e-12, "{cone:?} in {cell:?}: {clip:?}, {p:?}");
+            }
+        }
+    }
+    assert!(inside > 5000, "{inside}");
 }
 
 #[test]

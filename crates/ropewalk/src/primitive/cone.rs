@@ -36,6 +36,9 @@ const ON_SURFACE: f64 = 1.0 / (1u64 << 48) as f64;
 /// Each doubles the number of digits, and a root has eight at least.
 const NEWTON_STEPS: usize = 3;
 
+/// A point is as good as on the axis if it lies beside it by no more than this share of its distance from the base.
+const ON_AXIS: f64 = 1.0 / (1u64 << 20) as f64;
+
 /// Rounds of the clip: each narrows the piece by the box of the one before.
 const CLIP_ROUNDS: usize = 3;
 
@@ -187,9 +190,13 @@ impl Frame {
             (radii.0.min(radii.1) * (1.0 - SLACK), radii.0.max(radii.1) * (1.0 + SLACK));
         // Look from the axis towards the cell's middle.
         let middle = 0.5 * (lo + hi);
-        let toward = (middle - axis * middle.dot(axis))
-            .try_normalize()
-            .unwrap_or_else(|| axis.any_orthonormal_vector());
+        let beside = middle - axis * middle.dot(axis);
+        let toward = if beside.length() > ON_AXIS * middle.length() {
+            beside.normalize()
+        } else {
+            // What is left are roundings, which may point along the axis.
+            axis.any_orthonormal_vector()
+        };
         let toward = (toward - axis * toward.dot(axis)).normalize();
         let aside = axis.cross(toward);
         let (x, y) = (range(toward), range(aside));
