@@ -29,7 +29,17 @@ def on_post_build(config, **_):
         shutil.copytree(RUST, pathlib.Path(config.site_dir) / "rust", dirs_exist_ok=True)
 
 
+def check_tables(markdown, page):
+    """A table whose rows have more or fewer cells than its header is none on some hosts, and loses cells on others."""
+    lines = re.sub(r"`[^`\n]*`", "", markdown).split("\n")
+    cells = [len(re.findall(r"(?<!\\)\|", line)) if line.startswith("|") else 0 for line in lines]
+    for i, (before, here) in enumerate(zip(cells, cells[1:])):
+        if before and here and before != here:
+            raise ValueError(f"{page.file.src_uri}: expected {before - 1} cells as in the row before, found {here - 1}: {lines[i + 1]}")
+
+
 def on_page_markdown(markdown, page, **_):
+    check_tables(markdown, page)
     folder = (ROOT / "docs" / page.file.src_uri).parent
 
     def plain(link):
