@@ -37,11 +37,11 @@ def rectangle(box, **style):
     return Rectangle((box[0], box[1]), box[2] - box[0], box[3] - box[1], **style)
 
 
-def save(figure, name):
+def save(figure, name, colors=None):
     figure.savefig(name, dpi=110, facecolor="white", bbox_inches="tight", pad_inches=0.06)
     plt.close(figure)
-    # A palette makes a third of the bytes.
-    Image.open(name).convert("RGB").quantize(64, dither=Image.Dither.NONE).save(name, optimize=True)
+    if colors:
+        Image.open(name).convert("RGB").quantize(colors, dither=Image.Dither.NONE).save(name, optimize=True)
 
 
 class Plan:
@@ -431,7 +431,8 @@ def heat(data):
             means.setdefault(name, {})[kind] = picture.mean()
             ax.set_title(f"{titles[name]}: {picture.mean():.1f}", fontsize=9)
         figure.colorbar(shown, ax=axes[row], label=f"{kind} a pixel", shrink=0.9)
-    save(figure, "tree-heat.png")
+    # Few colours, for the size of the file.
+    save(figure, "tree-heat.png", 64)
     return means
 
 
