@@ -1,5 +1,6 @@
 //! The header is what cbindgen makes of the sources.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// `UPDATE=1 cargo test -p ropewalk-c` writes it.
@@ -23,4 +24,24 @@ fn header_is_up_to_date() {
     }
     let found = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(found == made, "include/ropewalk.h is out of date: UPDATE=1 cargo test -p ropewalk-c");
+}
+
+/// docs/c.md has a row for each function of the header, and no others.
+#[test]
+fn every_function_is_documented() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |path: &str| std::fs::read_to_string(root.join(path)).unwrap();
+    let (header, page) = (read("include/ropewalk.h"), read("../../docs/c.md"));
+    let declared: BTreeSet<&str> = header
+        .lines()
+        .filter(|line| !line.starts_with("//") && !line.starts_with([' ', '/', '*']))
+        .filter_map(|line| line.split_once('('))
+        .filter_map(|(before, _)| before.rsplit([' ', '*']).next())
+        .filter(|name| name.starts_with("ropewalk_"))
+        .collect();
+    let rows = page.lines().filter_map(|line| line.strip_prefix("| `")?.split_once('`'));
+    let listed: BTreeSet<&str> =
+        rows.map(|(name, _)| name).filter(|name| name.starts_with("ropewalk_")).collect();
+    assert!(declared.len() > 10, "the header is not read as it is written: {declared:?}");
+    assert_eq!(declared, listed, "functions of include/ropewalk.h, and rows of docs/c.md");
 }
