@@ -165,7 +165,13 @@ fn textures_lie_in_the_folder_and_nowhere_else() {
             .unwrap();
         read(&inner, "a.obj").unwrap()
     };
-    assert_eq!(texture("ok.png").images.len(), 1);
+    for name in ["ok.png", "./ok.png", ".\\ok.png", "././ok.png"] {
+        assert_eq!(texture(name).images.len(), 1, "{name}");
+    }
+    std::fs::write(inner.join("a.obj"), format!("mtllib ./a.mtl\n{FLAT}usemtl m\nf 1 2 3\n"))
+        .unwrap();
+    assert_eq!(read(&inner, "a.obj").unwrap().images.len(), 1);
+    assert!(texture(".").skipped[0].contains("expected a regular file"));
     let refused = [
         "../secret.png",
         "..\\secret.png",
