@@ -30,7 +30,8 @@ def read_mesh(
     path: str | os.PathLike[str],
 ) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
     """Vertices (V, 3) and triangles (F, 3) of a mesh file: OBJ, PLY (ascii or binary, both byte orders),
-    STL (ascii or binary), OFF, or glTF 2.0 (.gltf with its buffers, .glb), also gzipped.
+    STL (ascii or binary), OFF, or glTF 2.0 (.gltf with its buffers, .glb), also gzipped. Which of them it is
+    the content tells, then the name, as for the command line.
 
     Positions and faces are read, nothing else. All meshes, groups and nodes of a file are one mesh, in
     their order, those of glTF moved by their nodes. Polygons become triangles in the order of their
@@ -54,8 +55,7 @@ def read_mesh(
     mesh = _ropewalk.read_mesh(name)
     if mesh is None:
         raise SceneFileError(
-            f"{name}: expected a name that ends in .obj, .ply, .stl, .off, .gltf or .glb, or one of them "
-            "and .gz",
+            f"{name}: expected a mesh in OBJ, PLY, STL, OFF or glTF, found a scene, which ropewalk.load reads",
             "path",
         )
     return mesh

@@ -100,7 +100,7 @@ def test_names(tmp_path):
             read(tmp_path / "absent.ply")
         with pytest.raises(ropewalk.ArgumentTypeError, match="path"):
             read(3.5)
-    with pytest.raises(ropewalk.SceneFileError, match="ends in .obj"):
+    with pytest.raises(ropewalk.SceneFileError, match="found a scene, which ropewalk.load reads"):
         ropewalk.read_mesh("spd:balls:2")
     (tmp_path / "d.obj").mkdir()
     with pytest.raises(ropewalk.SceneFileError, match="directory"):
@@ -108,6 +108,32 @@ def test_names(tmp_path):
     odd = tmp_path / "with space \u00e4.obj"
     odd.write_bytes(obj())
     assert len(ropewalk.load(str(odd))) == len(ropewalk.load(odd)) == 4
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("other", ["mesh", "mesh.txt", "mesh.glb"])
+def test_content_goes_before_the_name(tmp_path, name, other):
+    # Of OBJ the content tells only where the name says nothing else.
+    if other == "mesh.glb" and name == "a.obj":
+        pytest.skip("the name tells")
+    path = tmp_path / other
+    path.write_bytes(FILES[name])
+    vertices, faces = ropewalk.read_mesh(path)
+    np.testing.assert_array_equal(vertices[faces], np.array(V)[F])
+    assert len(ropewalk.load(path)) == 4
+
+
+def test_scenes_and_others_by_content(tmp_path):
+    scene = tmp_path / "scene"
+    scene.write_text("v\nfrom 0 0 5\nat 0 0 0\nup 0 1 0\nangle 45\nhither 1\nresolution 8 8\ns 0 0 0 1\n")
+    assert len(ropewalk.load(scene)) == 1
+    with pytest.raises(ropewalk.SceneFileError, match="found a scene, which ropewalk.load reads"):
+        ropewalk.read_mesh(scene)
+    picture = tmp_path / "picture"
+    picture.write_bytes(b"\x89PNG\r\n\x1a\n")
+    for read in (ropewalk.load, ropewalk.read_mesh):
+        with pytest.raises(ropewalk.SceneFileError, match="picture: expected .* found a PNG image"):
+            read(picture)
 
 
 def test_far_from_the_origin(tmp_path):

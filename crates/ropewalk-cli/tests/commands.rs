@@ -441,6 +441,14 @@ fn mesh_files_are_rendered_and_timed() {
     assert_eq!((&json["method"], &json["samples"]), (&"paths".into(), &64.into()));
     let share = json["traversal_share"].as_f64().unwrap();
     assert!(share > 0.0 && share < 1.0 && json["mrays"].as_f64().unwrap() > 0.0, "{json}");
+    // The content tells, where the name does not.
+    std::fs::write(folder.path().join("four"), text).unwrap();
+    let args = ["render", "four", "--size", "40x30", "-o", "four.png", "--json"];
+    let output = ropewalk(folder.path(), &args);
+    let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert_eq!(json["method"], "paths");
+    let picture = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert!(picture("a.png") == picture("four.png"));
     let args = ["render", "four.obj", "--size", "40x30", "-o", "b.png", "--whitted", "--json"];
     let output = ropewalk(folder.path(), &args);
     let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");

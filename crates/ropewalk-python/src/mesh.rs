@@ -4,21 +4,23 @@ use crate::error::Failure;
 use crate::work;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use ropewalk_scene::{Loaded, MeshFormat, NffLimits, load_monitored};
-use std::path::Path;
+use ropewalk_scene::{Loaded, NffLimits, Recognised, load_monitored, parse_builtin, recognise};
 
 /// Vertices and faces.
 type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
 
-/// The mesh in a file; None if its name is not that of a mesh format.
+/// The mesh in a file, told by its content, then by its name; None if it is a scene in NFF or a built-in one.
 #[pyfunction]
 pub fn read_mesh<'py>(py: Python<'py>, path: &str) -> PyResult<Option<Arrays<'py>>> {
-    if MeshFormat::of_name(Path::new(path)).is_none() {
+    let failed = |error| Failure::File(error).into_exception(true);
+    if parse_builtin(path).map_err(failed)?.is_some()
+        || matches!(recognise(path).map_err(failed)?, Recognised::Nff)
+    {
         return Ok(None);
     }
     let load = |monitor: &work::Stop<'_>| load_monitored(path, &NffLimits::default(), monitor);
     let loaded = work::alone(py, load)?;
-    let loaded = loaded.map_err(|error| Failure::File(error).into_exception(true))?;
+    let loaded = loaded.map_err(failed)?;
     let Loaded::Mesh(_, mesh) = loaded else { return Ok(None) };
     let (v, f) = (mesh.vertices.len(), mesh.faces.len());
     let vertices = bytemuck::cast_vec::<[f64; 3], f64>(mesh.vertices).into_pyarray(py);

@@ -15,11 +15,13 @@ fn main() {
         trials.push(trial(format!("mesh::refused::{path}"), path, |path| refused(path, sentence)));
     }
     trials.push(trial("mesh::every_file_is_in_a_table", ".", every_file));
-    // Of no file: it compares two tables.
-    trials.push(libtest_mimic::Trial::test(
-        "mesh::trimesh_counts_the_same",
-        counts_are_those_of_trimesh,
-    ));
+    // Of no file: they compare tables.
+    trials.push(libtest_mimic::Trial::test("mesh::trimesh_counts_the_same", || {
+        counts_are_those_of(TRIMESH, &[])
+    }));
+    trials.push(libtest_mimic::Trial::test("mesh::assimp_counts_the_same", || {
+        counts_are_those_of(ASSIMP, &NOT_AS_ASSIMP)
+    }));
     libtest_mimic::run(&Arguments::from_args(), trials).exit()
 }
 
@@ -128,6 +130,25 @@ const REFUSED: [(&str, &str); 25] = [
 /// What trimesh counts; its first line names the version.
 const TRIMESH: &str = include_str!("trimesh_counts.txt");
 
+/// What Assimp counts, likewise.
+const ASSIMP: &str = include_str!("assimp_counts.txt");
+
+/// Files that we read and of which Assimp has another count or none, and why.
+const NOT_AS_ASSIMP: [(&str, &str); 6] = [
+    ("ugly/assimp/badNumber.gltf", "refused for a texture's scale that is no number"),
+    (
+        "ugly/assimp/box_longline.obj",
+        "634 of 944: of a polygon that meets itself it leaves out triangles",
+    ),
+    (
+        "ugly/assimp/concave_polygon.obj",
+        "58 of 64: its cutting of concave polygons leaves out triangles",
+    ),
+    ("ugly/assimp/regr01.obj", "names that are not UTF-8 stop its Python package"),
+    ("ugly/draco/test_extra_whitespace.ply", "blanks before a statement of the header are refused"),
+    ("ugly/tinyobj/leading-decimal-dot-issue-201.obj", "numbers such as .5 are refused"),
+];
+
 fn read(path: &Path, vertices: usize, faces: usize) -> Result<(), Failed> {
     let mesh = Mesh::read(path, &MeshLimits::DEFAULT)?;
     if (mesh.vertices.len(), mesh.faces.len()) != (vertices, faces) {
@@ -171,22 +192,25 @@ fn every_file(data: &Path) -> Result<(), Failed> {
     if unknown.is_empty() { Ok(()) } else { Err(format!("in no table: {unknown:?}").into()) }
 }
 
-fn counts_are_those_of_trimesh() -> Result<(), Failed> {
+/// Compares a list of counts with ours; `others` have none there, or another one, for a reason.
+fn counts_are_those_of(list: &str, others: &[(&str, &str)]) -> Result<(), Failed> {
+    let is_other = |path: &str| others.iter().any(|row| row.0 == path);
     let mut compared = 0;
-    for line in TRIMESH.lines().filter(|line| !line.starts_with('#')) {
+    for line in list.lines().filter(|line| !line.starts_with('#')) {
         let (path, count) = line.rsplit_once(' ').ok_or("a line without a count")?;
         let count: usize = count.parse()?;
         match READ.iter().find(|row| row.0 == path) {
-            Some(&(_, _, faces)) if faces == count => compared += 1,
+            Some(&(_, _, faces)) if faces == count && !is_other(path) => compared += 1,
+            Some(&(_, _, faces)) if faces != count && is_other(path) => {}
             Some(&(_, _, faces)) => return Err(format!("{path}: {faces}, not {count}").into()),
             // What it reads and we refuse has a reason.
             None if REFUSED.iter().any(|row| row.0 == path) => {}
             None => return Err(format!("{path} is in no table").into()),
         }
     }
-    if compared == READ.len() {
+    if compared + others.len() == READ.len() {
         Ok(())
     } else {
-        Err(format!("{compared} of {}", READ.len()).into())
+        Err(format!("{compared} of {}", READ.len() - others.len()).into())
     }
 }

@@ -130,6 +130,22 @@ fn libraries_of_materials() {
     assert_eq!(stage.skipped, skipped);
 }
 
+/// MeshLab writes `Tr 1` of surfaces that are opaque.
+#[test]
+fn surfaces_are_not_made_invisible() {
+    let opacity = |statements: &str| {
+        let library = format!("newmtl m\nKd 1 1 1\n{statements}");
+        let obj = format!("mtllib a.mtl\n{FLAT}usemtl m\nf 1 2 3\n");
+        let folder = folder(&[("a.obj", obj.as_bytes()), ("a.mtl", library.as_bytes())]);
+        let stage = read(folder.path(), "a.obj").unwrap();
+        (stage.materials[0].opacity, stage.skipped.iter().any(|s| s.starts_with("Tr 1 of MTL")))
+    };
+    assert_eq!(opacity("Tr 1.000\n"), (1.0, true));
+    assert_eq!(opacity("Tr 0.75\n"), (0.25, false));
+    assert_eq!(opacity("d 0\n"), (0.0, false));
+    assert_eq!(opacity("d 0\nTr 1\n"), (0.0, false));
+}
+
 #[test]
 fn images_that_are_normals() {
     let obj =
@@ -165,7 +181,13 @@ fn textures_lie_in_the_folder_and_nowhere_else() {
             .unwrap();
         read(&inner, "a.obj").unwrap()
     };
-    assert_eq!(texture("ok.png").images.len(), 1);
+    for name in ["ok.png", "./ok.png", ".\\ok.png", "././ok.png"] {
+        assert_eq!(texture(name).images.len(), 1, "{name}");
+    }
+    std::fs::write(inner.join("a.obj"), format!("mtllib ./a.mtl\n{FLAT}usemtl m\nf 1 2 3\n"))
+        .unwrap();
+    assert_eq!(read(&inner, "a.obj").unwrap().images.len(), 1);
+    assert!(texture(".").skipped[0].contains("expected a regular file"));
     let refused = [
         "../secret.png",
         "..\\secret.png",

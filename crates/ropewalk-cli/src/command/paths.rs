@@ -13,7 +13,9 @@ use ropewalk_render::path::{
     write_film,
 };
 use ropewalk_render::{Monitor, Progress, check_image_path};
-use ropewalk_scene::{Camera, Loaded, MeshFormat, MeshLimits, NffLimits, Stage};
+use ropewalk_scene::{
+    Camera, Loaded, MeshFormat, MeshLimits, NffLimits, Recognised, Stage, parse_builtin, recognise,
+};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -284,8 +286,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 /// A stage from a mesh file, or from an NFF scene as triangles; whether `z` is up in files of its kind.
 fn read(spec: &str) -> anyhow::Result<(Stage, bool)> {
-    let format = MeshFormat::of_name(Path::new(spec)).filter(|_| !spec.starts_with("spd:"));
-    if let Some(format) = format {
+    if parse_builtin(spec)?.is_none()
+        && let Recognised::Mesh(format) = recognise(spec)?
+    {
         let bar = interrupt::bar(1000, "read");
         let watch = Watch { cancel: interrupt::flag(), bar: &bar };
         let stage = Stage::read_monitored(Path::new(spec), &MeshLimits::DEFAULT, &watch);

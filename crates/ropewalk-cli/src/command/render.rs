@@ -8,7 +8,7 @@ use ropewalk::method::Method;
 use ropewalk_render::{
     AovKind, Monitor, Render, RenderSettings, check_image_path, render, write_image,
 };
-use ropewalk_scene::{FacetPolicy, MeshFormat};
+use ropewalk_scene::{FacetPolicy, Recognised, parse_builtin, recognise};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -90,8 +90,12 @@ struct Output {
 
 /// Renders and writes the pictures.
 pub fn run(args: &Args) -> anyhow::Result<()> {
-    let is_mesh = || MeshFormat::of_name(Path::new(&args.scene)).is_some();
-    if args.paths.path || (!args.whitted && !args.scene.starts_with("spd:") && is_mesh()) {
+    // By content, then by name, as every command tells files.
+    let is_mesh = || -> anyhow::Result<bool> {
+        let is_builtin = parse_builtin(&args.scene)?.is_some();
+        Ok(!is_builtin && matches!(recognise(&args.scene)?, Recognised::Mesh(_)))
+    };
+    if args.paths.path || (!args.whitted && is_mesh()?) {
         return match args.whitted_option() {
             Some(name) => Err(usage(format!("{name} needs --whitted: paths do not have it"))),
             None => paths::run(args),

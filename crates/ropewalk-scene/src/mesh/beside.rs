@@ -49,11 +49,13 @@ impl<'a> Beside<'a> {
         Beside { folder: folder.map(here), left: Cell::new(bytes) }
     }
 
-    /// The bytes of the file `name`, at least `least` of them: a relative path of plain parts. Symbolic links are followed as far
+    /// The bytes of the file `name`, at least `least` of them: a relative path of plain parts, `./` among them. Symbolic links are followed as far
     /// as they stay in the folder.
     pub fn read(&self, name: &str, least: u64) -> Result<Vec<u8>, Refused> {
         let relative = PathBuf::from(name);
-        let is_plain = relative.components().all(|c| matches!(c, Component::Normal(_)));
+        // Many programs write `./` first.
+        let is_plain =
+            relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         let first = name.split('/').next().unwrap_or_default();
         let is_other = first.contains(':') || name.contains('\\') || name.contains('\0');
         let inside = "a file in this folder or below, without \"..\"";

@@ -101,6 +101,32 @@ impl<'a> Input<'a> {
         self.at += count as u64;
     }
 
+    /// The next `count` bytes, which are ahead, and goes on behind them.
+    #[inline]
+    pub fn take(&mut self, count: usize) -> &[u8] {
+        let start = self.start;
+        self.skip(count);
+        &self.buffer[start..][..count]
+    }
+
+    /// Whole lines ahead, and at the end what is left. Nothing means that there is no more. A line goes on behind a
+    /// backslash at its end.
+    pub fn lines(&mut self) -> Result<&[u8]> {
+        let mut wanted = 1;
+        let length = loop {
+            let ahead = self.ahead(wanted)?;
+            let whole = whole_lines(ahead);
+            if whole > 0 {
+                break whole;
+            }
+            if ahead.len() < wanted {
+                break ahead.len();
+            }
+            wanted = 2 * ahead.len();
+        };
+        Ok(&self.buffer[self.start..][..length])
+    }
+
     #[cold]
     fn fill(&mut self, count: usize) -> Result<()> {
         self.buffer.copy_within(self.start..self.end, 0);
@@ -146,6 +172,23 @@ impl<'a> Input<'a> {
         }
         Ok(bytes)
     }
+}
+
+/// Length of the lines in some bytes that surely end there.
+fn whole_lines(bytes: &[u8]) -> usize {
+    let mut end = bytes.len();
+    while let Some(last) = bytes[..end].iter().rposition(|&b| b == b'\n') {
+        if !goes_on(&bytes[..=last]) {
+            return last + 1;
+        }
+        end = last;
+    }
+    0
+}
+
+/// True of a line that the next one continues.
+pub fn goes_on(line: &[u8]) -> bool {
+    line.ends_with(b"\\\n") || line.ends_with(b"\\\r\n")
 }
 
 fn too_large(limits: &Watched<'_>, found: u64) -> super::MeshError {

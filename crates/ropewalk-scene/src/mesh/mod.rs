@@ -2,7 +2,7 @@
 //!
 //! [`Mesh`] reads positions and faces, [`Stage`] what a file says of looks too. Whatever a file announces is
 //! checked against its size before memory is taken for it, and every error says where it is and what was expected there.
-//! Large binary files are read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong.
+//! All but glTF is read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong.
 
 mod beside;
 mod defects;
@@ -183,7 +183,7 @@ fn read_input(
     };
     let mut stage = match format {
         MeshFormat::Obj => {
-            let (soup, named) = obj::parse(&input.rest()?, soup, limits)?;
+            let (soup, named) = obj::parse(input, soup, limits)?;
             let mut stage = finished(soup)?;
             if with_looks {
                 mtl::dress(&mut stage, &named, &beside, limits)?;
@@ -199,7 +199,7 @@ fn read_input(
             stage
         }
         MeshFormat::Stl => finished(stl::parse(input, soup, limits)?)?,
-        MeshFormat::Off => finished(off::parse(&input.rest()?, soup, limits)?)?,
+        MeshFormat::Off => finished(off::parse(input, soup, limits)?)?,
         MeshFormat::Gltf => gltf::parse(&input.rest()?, soup, &beside, limits)?,
     };
     if stage.materials.is_empty() {

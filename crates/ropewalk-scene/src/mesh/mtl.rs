@@ -207,6 +207,13 @@ fn map(text: &str) -> Option<Map> {
     (!text.is_empty()).then(|| Map { file: slashes(text), clamps })
 }
 
+impl Raw {
+    /// True if nothing could be seen of the surface, by a statement that some programs mean the other way round.
+    fn is_gone(&self) -> bool {
+        self.d.is_none() && self.tr.is_some_and(|tr| tr >= 1.0)
+    }
+}
+
 fn translate(
     raw: &Raw,
     beside: &Beside<'_>,
@@ -214,6 +221,9 @@ fn translate(
     skipped: &mut Skipped,
     limits: &Watched<'_>,
 ) -> Result<Material> {
+    if raw.is_gone() {
+        skipped.note("Tr 1 of MTL files, which MeshLab writes of opaque surfaces");
+    }
     let mut material = plain(raw);
     let mut texture = |map: &Option<Map>, pictures: &mut Pictures| -> Result<Option<Texture>> {
         let Some(Map { file, clamps }) = map else {
@@ -263,7 +273,8 @@ fn plain(raw: &Raw) -> Material {
         _ => default.base_color,
     };
     let illum = raw.illum.map_or(-1, |x| x as i32);
-    let opacity = share(raw.d.or(raw.tr.map(|tr| 1.0 - tr)).unwrap_or(1.0));
+    let tr = raw.tr.filter(|_| !raw.is_gone());
+    let opacity = share(raw.d.or(tr.map(|tr| 1.0 - tr)).unwrap_or(1.0));
     let lets_through = opacity < 1.0 || !is_black(raw.tf);
     let is_glass = matches!(illum, 6 | 7) || matches!(illum, 4 | 9) && lets_through;
     let is_metal = !is_glass

@@ -3,6 +3,7 @@
 
 use super::Watched;
 use super::error::{Place, Result, wrong};
+use super::input::{Input, goes_on};
 use super::soup::{NONE, Soup, linear};
 use super::text::{Words, parse as number, quote};
 use std::collections::HashMap;
@@ -19,23 +20,61 @@ pub struct Named {
     places: HashMap<String, u32>,
 }
 
+/// What is known between lines.
+#[derive(Default)]
+struct State {
+    named: Named,
+    /// True if there are smoothing groups.
+    smooths: bool,
+    /// The largest index, and where it stands: vertices may come later.
+    largest: (i64, u64),
+}
+
 /// Vertices and faces; negative indices count back from the last vertex so far. Without looks, texture and normal
 /// indices are not even read.
-pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<(Soup, Named)> {
-    // A backslash at the end of a line goes on with the next one.
-    let joined: Vec<u8>;
-    let is_joined =
-        bytes.windows(2).any(|w| w == b"\\\n") || bytes.windows(3).any(|w| w == b"\\\r\n");
-    let bytes = if is_joined {
-        joined = join(bytes);
-        &joined[..]
-    } else {
-        bytes
-    };
-    let mut words = Words::new(bytes, 1, Some(b'#'));
-    let (mut named, mut smooths) = (Named::default(), false);
-    // The largest index, and where it stands: vertices may come later.
-    let mut largest = (0, 0);
+pub fn parse(mut input: Input<'_>, mut soup: Soup, limits: &Watched<'_>) -> Result<(Soup, Named)> {
+    if matches!(input.ahead(2)?, [0xff, 0xfe, ..] | [0xfe, 0xff, ..]) {
+        return Err(wrong(Place::Start, "text in ASCII or UTF-8", "text in UTF-16"));
+    }
+    let (mut state, mut line) = (State::default(), 1);
+    loop {
+        let lines = input.lines()?;
+        if lines.is_empty() {
+            break;
+        }
+        let joined: Vec<u8>;
+        let is_joined =
+            lines.contains(&b'\\') && lines.split_inclusive(|&b| b == b'\n').any(goes_on);
+        let text = if is_joined {
+            joined = join(lines);
+            &joined[..]
+        } else {
+            lines
+        };
+        let length = lines.len();
+        let mut words = Words::new(text, line, Some(b'#'));
+        read(&mut words, &mut soup, &mut state, limits)?;
+        line = words.line();
+        input.skip(length);
+    }
+    let State { named, smooths, largest } = state;
+    if soup.faces() > 0 && largest.0 >= soup.vertices.len() as i64 {
+        let what = format!("a vertex from 1 to {}", soup.vertices.len());
+        return Err(wrong(Place::Line(largest.1), what, largest.0 + 1));
+    }
+    if smooths && soup.looks.as_ref().is_some_and(|looks| looks.normals.is_empty()) {
+        soup.skip("smoothing groups, since the file has no normals");
+    }
+    Ok((soup, named))
+}
+
+/// Reads whole lines.
+fn read(
+    words: &mut Words<'_>,
+    soup: &mut Soup,
+    state: &mut State,
+    limits: &Watched<'_>,
+) -> Result<()> {
     while let Some(word) = words.next() {
         let line = words.line();
         let place = || Place::Line(line);
@@ -49,12 +88,12 @@ pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<(Soup
                 ];
                 soup.vertex(place, point, limits)?;
                 if soup.looks.is_some() {
-                    read_color(&mut words, &mut soup);
+                    read_color(words, soup);
                 }
             }
             b"f" => {
                 if soup.looks.is_some() {
-                    use_material(&mut soup, &mut named, None);
+                    use_material(soup, &mut state.named, None);
                 }
                 while let Some(corner) = words.next_on_line() {
                     let mut parts = corner.split(|&b| b == b'/');
@@ -66,20 +105,29 @@ pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<(Soup
                         }
                         i if i > 0 => i - 1,
                         i if i.checked_add(count).is_some_and(|i| i >= 0) => i + count,
+                        i if count == 0 => {
+                            return Err(wrong(place(), "a vertex, of which there are none yet", i));
+                        }
                         i => return Err(wrong(place(), format!("a vertex from -{count} on"), i)),
                     };
                     if index >= limits.vertices.min(NONE as usize) as i64 {
                         let what = format!("at most {} vertices", limits.vertices);
                         return Err(wrong(place(), what, quote(corner)));
                     }
-                    if index >= largest.0 {
-                        largest = (index, line);
+                    if index >= state.largest.0 {
+                        state.largest = (index, line);
                     }
                     soup.open.push(index as u32);
                     if let Some(looks) = &mut soup.looks {
                         let counts = [looks.uvs.len(), looks.normals.len()];
                         looks.open.push(counts.map(|count| reference(parts.next(), count)));
                     }
+                }
+                if let Some(looks) = &mut soup.looks
+                    && looks.open.iter().all(|&named| named == [NONE; 2])
+                {
+                    // Nothing to remember of corners that name nothing.
+                    looks.open.clear();
                 }
                 soup.end_polygon(place, limits)?;
             }
@@ -88,15 +136,17 @@ pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<(Soup
                 return Err(wrong(place(), "text", quote(word)));
             }
             _ if soup.looks.is_none() => {}
-            b"vt" | b"vn" => read_row(&mut words, word == b"vt", &mut soup, &place(), limits)?,
+            b"vt" | b"vn" => read_row(words, word == b"vt", soup, &place(), limits)?,
             b"usemtl" => {
-                let name = rest(&mut words);
-                use_material(&mut soup, &mut named, Some(name));
+                let name = rest(words);
+                use_material(soup, &mut state.named, Some(name));
             }
-            b"mtllib" if named.libraries.len() < 1000 => named.libraries.push(rest(&mut words)),
+            b"mtllib" if state.named.libraries.len() < 1000 => {
+                state.named.libraries.push(rest(words))
+            }
             b"s" => {
                 let group = words.next_on_line().unwrap_or_default();
-                smooths |= !matches!(group, b"off" | b"0" | b"");
+                state.smooths |= !matches!(group, b"off" | b"0" | b"");
             }
             b"l" | b"p" => soup.skip(format!("{} elements", String::from_utf8_lossy(word))),
             b"curv" | b"curv2" | b"surf" | b"vp" | b"bzp" | b"bsp" => {
@@ -106,14 +156,7 @@ pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<(Soup
         }
         words.skip_line();
     }
-    if soup.faces() > 0 && largest.0 >= soup.vertices.len() as i64 {
-        let what = format!("a vertex from 1 to {}", soup.vertices.len());
-        return Err(wrong(Place::Line(largest.1), what, largest.0 + 1));
-    }
-    if smooths && soup.looks.as_ref().is_some_and(|looks| looks.normals.is_empty()) {
-        soup.skip("smoothing groups, since the file has no normals");
-    }
-    Ok((soup, named))
+    Ok(())
 }
 
 /// The material of faces that follow: one by name, or the nameless one if there is none yet.
@@ -134,7 +177,7 @@ fn use_material(soup: &mut Soup, named: &mut Named, name: Option<String>) {
 
 /// The colour behind a position, in sRGB; a single number there is a weight.
 fn read_color(words: &mut Words<'_>, soup: &mut Soup) {
-    let mut next = || -> Option<f32> { number(words.next_on_line(), "", &Place::Start).ok() };
+    let mut next = || -> Option<f32> { words.next_on_line().and_then(maybe) };
     let (Some(r), Some(g), Some(b)) = (next(), next(), next()) else {
         return;
     };
@@ -168,7 +211,7 @@ fn read_row(
     // Those that are no numbers count as absent: what counts is that the mesh opens.
     let mut next = |absent: f32| match words.next_on_line() {
         None => absent,
-        word => number::<f32>(word, "", place).ok().filter(|x| x.is_finite()).unwrap_or(f32::NAN),
+        Some(word) => maybe::<f32>(word).filter(|x| x.is_finite()).unwrap_or(f32::NAN),
     };
     let row = [
         next(f32::NAN),
@@ -190,8 +233,7 @@ fn read_row(
 
 /// The index of a texture coordinate or a normal; what is no index names none.
 fn reference(text: Option<&[u8]>, count: usize) -> u32 {
-    let text = text.filter(|text| !text.is_empty());
-    let Ok(index) = number::<i64>(text, "", &Place::Start) else {
+    let Some(index) = text.filter(|text| !text.is_empty()).and_then(maybe::<i64>) else {
         return NONE;
     };
     let index = if index > 0 { index - 1 } else { index.saturating_add(count as i64) };
@@ -200,6 +242,11 @@ fn reference(text: Option<&[u8]>, count: usize) -> u32 {
         0.. => u32::try_from(index).unwrap_or(NONE - 1),
         _ => NONE - 1,
     }
+}
+
+/// A number, where there need be none.
+fn maybe<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
+    std::str::from_utf8(word).ok()?.parse().ok()
 }
 
 /// The rest of a line, trimmed.
@@ -212,8 +259,8 @@ fn rest(words: &mut Words<'_>) -> String {
 fn join(bytes: &[u8]) -> Vec<u8> {
     let (mut out, mut owed) = (Vec::with_capacity(bytes.len()), 0);
     for line in bytes.split_inclusive(|&b| b == b'\n') {
-        let end = line.trim_ascii_end();
-        if end.last() == Some(&b'\\') && line.last() == Some(&b'\n') {
+        if goes_on(line) {
+            let end = line.trim_ascii_end();
             out.extend_from_slice(&end[..end.len() - 1]);
             out.push(b' ');
             owed += 1;

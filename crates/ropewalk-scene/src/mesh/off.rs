@@ -2,21 +2,27 @@
 
 use super::Watched;
 use super::error::{Place, Result, wrong};
+use super::input::Input;
 use super::soup::Soup;
-use super::text::{Words, quote};
+use super::text::{Stream, quote};
 
 /// Vertices and faces.
-pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<Soup> {
-    let mut words = Words::new(bytes, 1, Some(b'#'));
-    let head = words.next().unwrap_or_default();
+pub fn parse(input: Input<'_>, soup: Soup, limits: &Watched<'_>) -> Result<Soup> {
+    let mut words = Stream::new(input, 1, Some(b'#'));
+    let result = read(&mut words, soup, limits);
+    words.checked(result)
+}
+
+fn read(words: &mut Stream<'_>, mut soup: Soup, limits: &Watched<'_>) -> Result<Soup> {
+    let head = words.next().unwrap_or_default().to_vec();
     let is_known = matches!(
-        head,
+        &head[..],
         b"OFF" | b"COFF" | b"NOFF" | b"CNOFF" | b"STOFF" | b"STCOFF" | b"STNOFF" | b"STCNOFF"
     );
     if !is_known {
-        return Err(wrong(words.place(), "OFF, or COFF, NOFF or STOFF", quote(head)));
+        return Err(wrong(words.place(), "OFF, or COFF, NOFF or STOFF", quote(&head)));
     }
-    if words.clone().next_on_line() == Some(b"BINARY") {
+    if words.peek_on_line() == Some(b"BINARY") {
         return Err(wrong(words.place(), "an ascii OFF file", "BINARY"));
     }
     let vertices = words.count("the number of vertices")?;
@@ -26,14 +32,16 @@ pub fn parse(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<Soup>
     words.skip_line();
     // A vertex takes 6 bytes at least, a face 8.
     let needed = vertices.saturating_mul(6).saturating_add(faces.saturating_mul(8));
-    if needed > words.left() as u64 + 1 {
+    if needed > words.left().saturating_add(1) {
         let what = format!("{vertices} vertices and {faces} faces");
         return Err(wrong(place, what, format!("{} bytes of text", words.left())));
     }
     if head != b"OFF" {
         soup.skip("colours, normals and texture coordinates of OFF vertices");
     }
-    soup.reserve(vertices as usize, faces as usize, limits);
+    // A gzipped file's size is not known; what it holds is paid for as it comes.
+    let most = if words.left() == u64::MAX { 1 << 20 } else { u64::MAX };
+    soup.reserve(vertices.min(most) as usize, faces.min(most) as usize, limits);
     for _ in 0..vertices {
         let x = words.number("x of a vertex")?;
         let (y, z) = (words.number("y of a vertex")?, words.number("z of a vertex")?);

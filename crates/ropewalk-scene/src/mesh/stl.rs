@@ -1,10 +1,10 @@
 //! STL, ascii or binary: three vertices a triangle.
 
-use super::Watched;
 use super::error::{Place, Result, wrong};
 use super::input::Input;
 use super::soup::Soup;
-use super::text::{Words, quote};
+use super::text::{Stream, quote};
+use super::{HEAD, Watched};
 
 /// Header of a binary file, with the count.
 const HEADER: usize = 84;
@@ -24,14 +24,17 @@ pub fn parse(mut input: Input<'_>, soup: Soup, limits: &Watched<'_>) -> Result<S
     if length.is_some() && length == input.size() {
         return binary(input, soup, limits);
     }
+    // No text has zero bytes; a binary file that was cut off, or whose size is not known, soon has.
+    let head = input.ahead(HEAD)?;
+    let is_text = !head.iter().take(4 * HEADER).any(|&b| b == 0);
+    if is_text && head.trim_ascii_start().starts_with(b"solid") {
+        let mut words = Stream::new(input, 1, None);
+        let result = ascii(&mut words, soup, limits);
+        return words.checked(result);
+    }
     let bytes = input.rest()?;
     if length == Some(bytes.len() as u64) {
         return binary(Input::of_plain(&bytes, limits)?, soup, limits);
-    }
-    // No text has zero bytes; a binary file that was cut off soon has.
-    let is_text = !bytes.iter().take(4 * HEADER).any(|&b| b == 0);
-    if is_text && bytes.trim_ascii_start().starts_with(b"solid") {
-        return ascii(&bytes, soup, limits);
     }
     Err(match length {
         Some(length) => {
@@ -79,11 +82,13 @@ fn binary(mut input: Input<'_>, mut soup: Soup, limits: &Watched<'_>) -> Result<
     Ok(soup)
 }
 
-fn ascii(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<Soup> {
-    let mut words = Words::new(bytes, 1, None);
+fn ascii(words: &mut Stream<'_>, mut soup: Soup, limits: &Watched<'_>) -> Result<Soup> {
     // Corners of the loop that is open.
     let mut open: Option<usize> = None;
-    while let Some(word) = words.next() {
+    let mut word = Vec::new();
+    while let Some(next) = words.next() {
+        word.clear();
+        word.extend_from_slice(next);
         let place = words.place();
         match (word.to_ascii_lowercase().as_slice(), open) {
             // Names may hold any words.
@@ -107,12 +112,12 @@ fn ascii(bytes: &[u8], mut soup: Soup, limits: &Watched<'_>) -> Result<Soup> {
                 return Err(wrong(place, "a loop of 3 vertices", corners));
             }
             (b"endfacet", None) => {}
-            (_, Some(_)) => return Err(wrong(place, "vertex or endloop", quote(word))),
+            (_, Some(_)) => return Err(wrong(place, "vertex or endloop", quote(&word))),
             (_, None) => {
                 return Err(wrong(
                     place,
                     "solid, facet, outer loop, endfacet or endsolid",
-                    quote(word),
+                    quote(&word),
                 ));
             }
         }
