@@ -14,8 +14,11 @@
 use super::bsdf::{Bsdf, Lobes, luminance};
 use super::camera::LensView;
 use super::film::Cell;
+use super::light::Chooser;
+use super::light_tree::Place;
 use super::sampler::{Purpose, Sampler, hash, unit_float};
-use super::settings::Strategy;
+use super::settings::{LightChoice, Strategy};
+use super::sight::Sight;
 use super::world::{Surface, World};
 use crate::offset::lifted_origin;
 use glam::Vec3;
@@ -79,6 +82,9 @@ impl std::ops::AddAssign<&PathCounts> for PathCounts {
 pub(crate) struct Integrator<'a> {
     pub world: &'a World,
     pub caster: BatchCaster<'a>,
+    /// What is seen of the sky from where; for the choice of lights by place.
+    pub sight: Option<Sight>,
+    pub light_choice: LightChoice,
     pub view: LensView,
     /// Pixels a row, which number the pixels.
     pub width: u32,
@@ -99,6 +105,8 @@ struct Path {
     throughput: Vec3,
     /// Density by which the ray was chosen; infinite if no light could have been sampled in its place.
     density: f32,
+    /// Where the ray was chosen.
+    place: Place,
     /// What the throughput holds because radiance changes with the index of refraction.
     compression: f32,
     /// Whether it is the first sample of its pixel in this pass.
@@ -195,6 +203,7 @@ impl Integrator<'_> {
                     sampler,
                     throughput: Vec3::ONE,
                     density: f32::INFINITY,
+                    place: Place { point: Vec3::ZERO, normal: Vec3::ZERO },
                     compression: 1.0,
                     is_first: sample == first,
                 });
@@ -250,8 +259,11 @@ impl Integrator<'_> {
             let wo = surface.frame.local(-Vec3::from_array(ray.dir)).normalize();
             let lobes = bsdf.lobes(wo);
             let chance = path.sampler.four(depth, Purpose::Light);
+            // Only glass gets light from behind.
+            let normal = if bsdf.glass > 0.0 { Vec3::ZERO } else { surface.shading };
+            path.place = Place { point: surface.position.as_vec3(), normal };
             if let Some((ray, radiance)) =
-                self.direct_light(&path, &surface, (&bsdf, &lobes), wo, chance)
+                self.direct_light(&path, &surface, (&bsdf, &lobes), wo, (depth, chance))
             {
                 wave.shadow_rays.push(ray);
                 let sampler = path.sampler;
@@ -290,12 +302,18 @@ impl Integrator<'_> {
         let mut sum = Vec3::ZERO;
         let sky = self.world.sky_radiance(direction);
         if sky != Vec3::ZERO {
-            let density = lights.environment_density(self.world.sky_density(direction));
-            sum += sky * self.weight_of_bsdf(path.density, density);
+            let density = |place: &Place| {
+                let by_sky = self.world.sky_density(direction);
+                lights.environment_density(&self.chooser(), place, by_sky)
+            };
+            sum += sky * self.weight_of_bsdf(path, density);
         }
         if let Some(sun) = self.world.sun() {
-            sum += sun.radiance(direction)
-                * self.weight_of_bsdf(path.density, lights.sun_density(sun));
+            let radiance = sun.radiance(direction);
+            if radiance != Vec3::ZERO {
+                let density = |place: &Place| lights.sun_density(&self.chooser(), place, sun);
+                sum += radiance * self.weight_of_bsdf(path, density);
+            }
         }
         path.throughput * sum
     }
@@ -307,10 +325,13 @@ impl Integrator<'_> {
             return radiance;
         }
         let cosine = Vec3::from_array(ray.dir).normalize().dot(surface.geometric).abs();
-        let by_area = self.world.lights().face_density(surface.face, surface.area);
         let distance2 = (surface.travelled * surface.travelled) as f32;
-        let density = by_area * distance2 / cosine.max(1e-9);
-        path.throughput * radiance * self.weight_of_bsdf(path.density, density)
+        let density = |place: &Place| {
+            let lights = self.world.lights();
+            let by_area = lights.face_density(&self.chooser(), place, surface.face, surface.area);
+            by_area * distance2 / cosine.max(1e-9)
+        };
+        path.throughput * radiance * self.weight_of_bsdf(path, density)
     }
 
     /// A shadow ray, and what it brings if nothing is in its way.
@@ -320,13 +341,17 @@ impl Integrator<'_> {
         surface: &Surface<'_>,
         (bsdf, lobes): (&Bsdf<'_>, &Lobes),
         wo: Vec3,
-        u: [f32; 4],
+        (depth, u): (u32, [f32; 4]),
     ) -> Option<(Ray, Vec3)> {
         if !bsdf.spreads() {
             return None;
         }
-        let arriving =
-            self.world.lights().sample(self.world, surface.position, [u[0], u[1], u[2]])?;
+        // More digits than a sample has: there may be many lights.
+        let digits = unit_float(hash(path.sampler.key() ^ hash(!depth)));
+        let choice = f64::from(u[0]) + f64::from(digits) * f64::from(f32::EPSILON / 2.0);
+        let lights = self.world.lights();
+        let (chooser, place) = (self.chooser(), [u[1], u[2]]);
+        let arriving = lights.sample(&chooser, surface.position, &path.place, choice, place)?;
         if self.strategy == Strategy::Bsdf && !arriving.is_single {
             return None;
         }
@@ -356,13 +381,18 @@ impl Integrator<'_> {
     }
 
     /// The weight of light that was met by scattering, where sampling the light would have had a density.
-    fn weight_of_bsdf(&self, density: f32, of_light: f32) -> f32 {
+    fn weight_of_bsdf(&self, path: &Path, of_light: impl FnOnce(&Place) -> f32) -> f32 {
         match self.strategy {
-            _ if density.is_infinite() => 1.0,
+            _ if path.density.is_infinite() => 1.0,
             Strategy::Bsdf => 1.0,
             Strategy::Lights => 0.0,
-            Strategy::Both => power_heuristic(density, of_light),
+            Strategy::Both => power_heuristic(path.density, of_light(&path.place)),
         }
+    }
+
+    fn chooser(&self) -> Chooser<'_> {
+        let choice = self.light_choice;
+        Chooser { world: self.world, sight: self.sight.as_ref(), choice }
     }
 
     /// Casts the shadow rays and adds the light of those that are free.

@@ -1,7 +1,13 @@
-//! What shines: faces, the sky, the sun, points, cones and parallel light, chosen by power.
+//! What shines: faces, the sky, the sun, points, cones and parallel light, and the choice among them.
+//!
+//! One light is chosen for a point. What is far (sky, sun, parallel light) has a share by its irradiance there, times the
+//! share of it that is seen nearby; what is near (faces, points, cones) has the rest and is chosen by a tree.
 
 use super::alias::AliasTable;
 use super::bsdf::{Frame, luminance};
+use super::light_tree::{LightBounds, LightTree, Place};
+use super::settings::LightChoice;
+use super::sight::Sight;
 use super::world::World;
 use crate::offset::lifted_origin;
 use glam::{DVec3, Vec3};
@@ -11,6 +17,9 @@ use std::f32::consts::{PI, TAU};
 /// Half of the angle that the sun of the built-in sky fills, in degrees: ten times that of the real one, for shadows
 /// with soft edges.
 const SUN_HALF_ANGLE: f32 = 2.5;
+
+/// The probability that is shared evenly among far lights and the near ones, lest a bad estimate starves one of them.
+const EVEN: f32 = 0.1;
 
 /// A disc in the sky.
 #[derive(Clone, Copy, Debug)]
@@ -60,10 +69,21 @@ enum Emitter {
 pub(crate) struct Lights {
     emitters: Vec<Emitter>,
     table: AliasTable,
-    /// Faces among the emitters, which come first, in ascending order.
+    /// The near emitters, which come first: `tree` numbers them alike.
+    tree: LightTree,
+    near: usize,
+    /// Faces among the emitters, which come first of all, in ascending order.
     faces: Vec<u32>,
     environment: Option<usize>,
     sun: Option<usize>,
+}
+
+/// How a light is chosen.
+#[derive(Clone, Copy)]
+pub(crate) struct Chooser<'a> {
+    pub world: &'a World,
+    pub sight: Option<&'a Sight>,
+    pub choice: LightChoice,
 }
 
 /// Light that may arrive at a point.
@@ -82,57 +102,138 @@ pub(crate) struct Arriving {
 }
 
 impl Lights {
-    /// The lights of a world, weighed by what they send out; light from infinity by what falls on a disc of the
-    /// scene's radius.
+    /// The lights of a world. Their powers are what they send out; those of light from infinity what falls on a disc
+    /// of the scene's radius.
     pub fn new(world: &World, radius: f32) -> Lights {
         let mut lights = Lights::default();
-        let mut powers = Vec::new();
+        let (mut powers, mut bounds) = (Vec::new(), Vec::new());
         for face in 0..world.geometry().len() as u32 {
             let power = world.emitted_power(face);
             if power > 0.0 {
                 lights.emitters.push(Emitter::Face(face));
                 lights.faces.push(face);
                 powers.push(f64::from(power));
+                bounds.push(world.bounds_of_light(face, power));
             }
         }
         let disc = PI * radius * radius;
-        let mut add = |emitter, power: f32, place: &mut Option<usize>| {
-            if power > 0.0 && power.is_finite() {
-                *place = Some(lights.emitters.len());
+        let mut add = |emitter, power: f32| {
+            let is_light = power > 0.0 && power.is_finite();
+            if is_light {
                 lights.emitters.push(emitter);
                 powers.push(f64::from(power));
             }
+            is_light.then(|| lights.emitters.len() - 1)
         };
-        if let Some(map) = world.environment() {
-            add(Emitter::Environment, map.power() * disc, &mut lights.environment);
-        }
-        if let Some(sun) = world.sun() {
-            let power = luminance(sun.radiance) * sun.solid_angle() * disc;
-            add(Emitter::Sun, power, &mut lights.sun);
+        for light in world.other_lights() {
+            let Some((near, power)) = bounds_of_other(light) else { continue };
+            if add(Emitter::Other(*light), power).is_some() {
+                bounds.push(near);
+            }
         }
         for light in world.other_lights() {
-            let bright = |c: [f32; 3]| luminance(Vec3::from_array(c));
-            let power = match light {
-                Light::Point { intensity, .. } => 2.0 * TAU * bright(*intensity),
-                Light::Spot { intensity, cone, .. } => {
-                    TAU * (1.0 - cone[1].min(PI).cos()) * bright(*intensity)
-                }
-                Light::Directional { irradiance, .. } => disc * bright(*irradiance),
-            };
-            add(Emitter::Other(*light), power, &mut None);
+            if let Light::Directional { irradiance, .. } = light {
+                add(Emitter::Other(*light), disc * luminance(Vec3::from_array(*irradiance)));
+            }
         }
+        let sky = world.environment().and_then(|m| add(Emitter::Environment, m.power() * disc));
+        let of_sun = |sun: &Sun| luminance(sun.radiance) * sun.solid_angle();
+        let sun = world.sun().and_then(|sun| add(Emitter::Sun, of_sun(sun) * disc));
+        (lights.environment, lights.sun) = (sky, sun);
         lights.table = AliasTable::new(&powers);
+        lights.near = bounds.len();
+        lights.tree = LightTree::new(&bounds);
         lights
     }
 
-    /// Light for a point, chosen by four numbers; `None` where none arrives.
-    pub fn sample(&self, world: &World, point: DVec3, u: [f32; 3]) -> Option<Arriving> {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.emitters.len()
+    }
+
+    /// What a far light weighs at a point: an estimate of its irradiance; 0 only where it gives none.
+    fn weight_of_far(&self, index: usize, chooser: &Chooser<'_>, place: &Place) -> f32 {
+        let [sky, sun] = chooser.sight.map_or([1.0; 2], |sight| sight.at(place.point));
+        let facing = |towards: Vec3, sine: f32| {
+            if place.normal == Vec3::ZERO {
+                return 1.0;
+            }
+            (place.normal.dot(towards) + sine + 1e-3).clamp(0.0, 1.0)
+        };
+        match self.emitters[index] {
+            Emitter::Environment => {
+                sky * chooser.world.environment().map_or(0.0, |map| 0.25 * map.power())
+            }
+            Emitter::Sun => chooser.world.sun().map_or(0.0, |disc| {
+                let sine = (1.0 - disc.cosine * disc.cosine).max(0.0).sqrt();
+                let irradiance = luminance(disc.radiance) * disc.solid_angle();
+                sun * irradiance * facing(disc.towards, sine)
+            }),
+            Emitter::Other(Light::Directional { direction, irradiance }) => {
+                let towards = -DVec3::from_array(direction).as_vec3().normalize_or_zero();
+                luminance(Vec3::from_array(irradiance)) * facing(towards, 0.0)
+            }
+            Emitter::Face(_) | Emitter::Other(_) => 0.0,
+        }
+    }
+
+    /// The sum of the weights of far and near lights, and how many of them are not zero.
+    fn weights(&self, chooser: &Chooser<'_>, place: &Place) -> (f32, f32) {
+        let far = (self.near..self.len()).map(|i| self.weight_of_far(i, chooser, place));
+        let near = std::iter::once(self.tree.importance(place));
+        near.chain(far).fold((0.0, 0.0), |(sum, count), weight| {
+            (sum + weight, if weight > 0.0 { count + 1.0 } else { count })
+        })
+    }
+
+    /// A light for a number in `0..1`, and its probability.
+    fn choose(&self, chooser: &Chooser<'_>, place: &Place, u: f64) -> Option<(usize, f32)> {
+        if chooser.choice == LightChoice::Power {
+            let (index, _) = self.table.sample(u as f32);
+            return Some((index, self.table.probability(index)));
+        }
+        let (sum, count) = self.weights(chooser, place);
+        let mut rest = u;
+        for index in self.near..self.len() {
+            let share = even_share(self.weight_of_far(index, chooser, place), sum, count);
+            if rest < f64::from(share) {
+                return Some((index, share));
+            }
+            rest -= f64::from(share);
+        }
+        let share = even_share(self.tree.importance(place), sum, count);
+        let inside = (rest / f64::from(share)).clamp(0.0, 1.0 - f64::EPSILON);
+        let (index, probability) = self.tree.sample(place, inside)?;
+        (share > 0.0).then_some((index, share * probability))
+    }
+
+    /// The probability with which a light is chosen.
+    fn probability(&self, index: usize, chooser: &Chooser<'_>, place: &Place) -> f32 {
+        if chooser.choice == LightChoice::Power {
+            return self.table.probability(index);
+        }
+        let (sum, count) = self.weights(chooser, place);
+        if index >= self.near {
+            return even_share(self.weight_of_far(index, chooser, place), sum, count);
+        }
+        let share = even_share(self.tree.importance(place), sum, count);
+        share * self.tree.probability(index, place)
+    }
+
+    /// Light for a point, chosen by a number and placed by two more; `None` where none arrives.
+    pub fn sample(
+        &self,
+        chooser: &Chooser<'_>,
+        point: DVec3,
+        at: &Place,
+        u: f64,
+        place: [f32; 2],
+    ) -> Option<Arriving> {
         if self.table.is_empty() {
             return None;
         }
-        let (index, _) = self.table.sample(u[0]);
-        let chance = self.table.probability(index);
-        let place = [u[1], u[2]];
+        let (index, chance) = self.choose(chooser, at, u)?;
+        let world = chooser.world;
         let far = |direction, radiance, density: f32| Arriving {
             direction,
             from: None,
@@ -176,20 +277,43 @@ impl Lights {
     }
 
     /// The density with which [`Lights::sample`] gives a point on a face, by area, if the face shines.
-    pub fn face_density(&self, face: u32, area: f32) -> f32 {
-        self.faces.binary_search(&face).map_or(0.0, |i| self.table.probability(i) / area)
+    pub fn face_density(&self, chooser: &Chooser<'_>, at: &Place, face: u32, area: f32) -> f32 {
+        let index = self.faces.binary_search(&face);
+        index.map_or(0.0, |i| self.probability(i, chooser, at) / area)
     }
 
     /// The density with which [`Lights::sample`] gives a direction of the environment, of which the environment's own
     /// density is given.
-    pub fn environment_density(&self, density: f32) -> f32 {
-        self.environment.map_or(0.0, |i| self.table.probability(i) * density)
+    pub fn environment_density(&self, chooser: &Chooser<'_>, at: &Place, density: f32) -> f32 {
+        self.environment.map_or(0.0, |i| self.probability(i, chooser, at) * density)
     }
 
     /// The density with which [`Lights::sample`] gives a direction to the sun.
-    pub fn sun_density(&self, sun: &Sun) -> f32 {
-        self.sun.map_or(0.0, |i| self.table.probability(i) / sun.solid_angle())
+    pub fn sun_density(&self, chooser: &Chooser<'_>, at: &Place, sun: &Sun) -> f32 {
+        self.sun.map_or(0.0, |i| self.probability(i, chooser, at) / sun.solid_angle())
     }
+}
+
+/// The share of a weight, part of it even.
+fn even_share(weight: f32, sum: f32, count: f32) -> f32 {
+    if weight > 0.0 { (1.0 - EVEN) * weight / sum + EVEN / count } else { 0.0 }
+}
+
+/// Where a point or a cone of light is, and its power; `None` for parallel light.
+fn bounds_of_other(light: &Light) -> Option<(LightBounds, f32)> {
+    let (position, intensity, axis, spread) = match *light {
+        Light::Point { position, intensity } => (position, intensity, Vec3::Z, PI),
+        Light::Spot { position, intensity, direction, cone } => {
+            let axis = DVec3::from_array(direction).as_vec3().normalize_or(Vec3::Z);
+            (position, intensity, axis, cone[1].min(PI))
+        }
+        Light::Directional { .. } => return None,
+    };
+    let position = DVec3::from_array(position).as_vec3();
+    let intensity = luminance(Vec3::from_array(intensity));
+    let power = TAU * (1.0 - spread.cos()) * intensity;
+    let (low, high) = (position, position);
+    Some((LightBounds { low, high, axis, spread, intensity, two_sided: false }, power))
 }
 
 /// Light without extent: it is met by shadow rays alone.

@@ -3,7 +3,8 @@
 use super::camera::LensView;
 use super::film::{Cell, Film};
 use super::integrator::{Integrator, PathCounts, Tile, Wave};
-use super::settings::PathSettings;
+use super::settings::{LightChoice, PathSettings};
+use super::sight::Sight;
 use super::world::World;
 use crate::error::RenderError;
 use crate::renderer::{Monitor, Progress};
@@ -52,9 +53,11 @@ pub fn trace_paths(
     lens.aperture *= world.scale();
     lens.focus = lens.focus.map(|x| x * world.scale());
     let view = LensView::new(&world.place_camera(camera), &lens, settings.size)?;
-    let integrator = Integrator {
+    let mut integrator = Integrator {
         world,
         caster: BatchCaster::new(tree, world.geometry()).with_threads(1),
+        sight: None,
+        light_choice: settings.light_choice,
         view,
         width: settings.size[0],
         seed: settings.seed,
@@ -62,7 +65,12 @@ pub fn trace_paths(
         strategy: settings.strategy,
         clamp: settings.clamp.unwrap_or(f32::INFINITY),
     };
-    let mut trace = || passes(&integrator, settings, monitor, each_pass);
+    let mut trace = || {
+        if settings.light_choice == LightChoice::Place {
+            integrator.sight = Sight::new(world, &integrator.caster);
+        }
+        passes(&integrator, settings, monitor, each_pass)
+    };
     match settings.threads {
         None => Ok(trace()),
         Some(threads) => rayon::ThreadPoolBuilder::new()

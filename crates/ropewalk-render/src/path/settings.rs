@@ -16,6 +16,16 @@ pub enum Strategy {
     Bsdf,
 }
 
+/// How the light is chosen that a vertex of a path is connected with; the means are the same, the noise is not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightChoice {
+    /// By an estimate of what arrives at the vertex.
+    #[default]
+    Place,
+    /// By what lights send out, everywhere alike.
+    Power,
+}
+
 /// Settings of a path-traced picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathSettings {
@@ -35,6 +45,8 @@ pub struct PathSettings {
     pub lens: Lens,
     /// Which light counts.
     pub strategy: Strategy,
+    /// How one of many lights is chosen.
+    pub light_choice: LightChoice,
     /// Largest luminance that a path may bring after its first bounce; darkens, but tames bright specks.
     pub clamp: Option<f32>,
 }
@@ -50,6 +62,7 @@ impl Default for PathSettings {
             threads: None,
             lens: Lens::default(),
             strategy: Strategy::Both,
+            light_choice: LightChoice::Place,
             clamp: None,
         }
     }

@@ -5,6 +5,7 @@ use super::bsdf::{Bsdf, Frame, luminance};
 use super::camera::Up;
 use super::environment::Environment;
 use super::light::{Lights, Sun};
+use super::light_tree::LightBounds;
 use super::texture::{self, Encoding};
 use crate::error::RenderError;
 use glam::{DMat3, DVec3, Vec2, Vec3};
@@ -394,6 +395,31 @@ impl World {
         let area = 0.5 * (b - a).cross(c - a).length() as f32;
         let sides = if material.two_sided { 2.0 } else { 1.0 };
         sides * area * std::f32::consts::PI * luminance(plain * mean)
+    }
+
+    /// Where a face of some power shines.
+    pub(crate) fn bounds_of_light(&self, face: u32, power: f32) -> LightBounds {
+        let corners = self.corners(face);
+        let axis = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalize_or_zero();
+        let [a, b, c] = corners.map(|p| p.as_vec3());
+        let two_sided = self.material(face).two_sided;
+        let sides = if two_sided { 2.0 } else { 1.0 };
+        LightBounds {
+            low: a.min(b).min(c),
+            high: a.max(b).max(c),
+            axis: axis.as_vec3(),
+            spread: 0.0,
+            intensity: power / (sides * std::f32::consts::PI),
+            two_sided,
+        }
+    }
+
+    /// Corners of a box around the mesh, without the ground.
+    pub(crate) fn stage_box(&self) -> [Vec3; 2] {
+        let start = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        (0..self.stage_faces as u32)
+            .flat_map(|face| self.corners(face))
+            .fold(start, |[low, high], p| [low.min(p.as_vec3()), high.max(p.as_vec3())])
     }
 
     /// A point of a face that shines, evenly by area.

@@ -1,8 +1,12 @@
 //! Sampling lights, meeting them by scattering, and both together agree.
 
 use crate::common::*;
-use ropewalk_render::path::{Backdrop, Environment, PathSettings, Strategy, Surroundings, Up};
-use ropewalk_scene::stage::Material;
+use ropewalk::wide::WideTree;
+use ropewalk_render::path::{
+    Backdrop, Environment, LightChoice, PathSettings, Strategy, Surroundings, Up, World,
+};
+use ropewalk_scene::Stage;
+use ropewalk_scene::stage::{Light, Material};
 
 /// Independent pictures of each kind.
 const SEEDS: u32 = 16;
@@ -61,5 +65,73 @@ fn strategies_agree_within_noise() {
             assert!(apart <= SIGMAS * sigma, "{name:?}, third {third}: {a:?} {b:?}");
             assert!(a.1 < NOISE * a.0 && b.1 < NOISE * b.0, "{name:?}, {third}: {a:?} {b:?}");
         }
+    }
+}
+
+/// A corridor of lamps of many powers, most of which are far from any point, under a sky that a roof hides.
+pub fn corridor() -> Stage {
+    let mut stage = stage(vec![matte(0.6), lamp(30.0), lamp(3.0)]);
+    add_quad(&mut stage, [0.0, -1.0, 0.0], [40.0, 0.0, 0.0], [0.0, 2.0, 0.0], 0);
+    add_quad(&mut stage, [0.0, 1.0, 0.0], [40.0, 0.0, 0.0], [0.0, 0.0, 2.0], 0);
+    add_quad(&mut stage, [0.0, -1.0, 2.0], [0.0, 2.0, 0.0], [40.0, 0.0, 0.0], 0);
+    for i in 0..80 {
+        let corner = [0.4 + 0.5 * f64::from(i), -0.1, 1.9];
+        add_quad(&mut stage, corner, [0.0, 0.15, 0.0], [0.15, 0.0, 0.0], 1 + i % 2);
+    }
+    let intensity = [0.4; 3];
+    stage.lights = vec![Light::Point { position: [33.0, 0.3, 1.0], intensity }];
+    stage
+}
+
+/// The mean over pixels and seeds, and the mean of the pixels' variances over seeds.
+fn noise(
+    made: &(World, WideTree),
+    light_choice: LightChoice,
+    strategy: Strategy,
+) -> (f64, f64, f64) {
+    let camera = camera([1.0, -0.5, 1.0], [6.0, 0.3, 0.7], 60.0, [24, 16]);
+    let films: Vec<_> = (0..SEEDS)
+        .map(|seed| {
+            let samples = 32;
+            let settings = PathSettings {
+                samples,
+                strategy,
+                light_choice,
+                seed,
+                max_depth: 3,
+                ..Default::default()
+            };
+            expose(made, &camera, &settings).radiance()
+        })
+        .collect();
+    let n = f64::from(SEEDS);
+    let means: Vec<f64> = films
+        .iter()
+        .map(|film| film.iter().map(|p| f64::from(p[1])).sum::<f64>() / film.len() as f64)
+        .collect();
+    let mean = means.iter().sum::<f64>() / n;
+    let error = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+    let pixels = films[0].len();
+    let variance = |i: usize| {
+        let mean = films.iter().map(|f| f64::from(f[i][1])).sum::<f64>() / n;
+        films.iter().map(|f| (f64::from(f[i][1]) - mean).powi(2)).sum::<f64>() / (n - 1.0)
+    };
+    (mean, error, (0..pixels).map(variance).sum::<f64>() / pixels as f64)
+}
+
+/// With equal samples the choice by place has the mean of the choice by power, and less than half of its variance.
+#[test]
+fn lights_chosen_by_place_give_the_same_picture_with_less_noise() {
+    let around = Surroundings { up: Up::Z, backdrop: Backdrop::Sky, ground: false };
+    let made = world(corridor(), &around);
+    let reference = noise(&made, LightChoice::Power, Strategy::Both);
+    for strategy in [Strategy::Both, Strategy::Lights] {
+        let power = noise(&made, LightChoice::Power, strategy);
+        let place = noise(&made, LightChoice::Place, strategy);
+        let sigma = reference.1.hypot(place.1);
+        let apart = (reference.0 - place.0).abs();
+        assert!(apart <= SIGMAS * sigma, "{strategy:?}: {reference:?} {place:?}");
+        assert!(sigma < NOISE * reference.0, "{strategy:?}: {reference:?} {place:?}");
+        assert!(place.2 < power.2 / 2.0, "{strategy:?}: {power:?} {place:?}");
     }
 }

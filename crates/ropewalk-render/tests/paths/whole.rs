@@ -7,7 +7,7 @@ use ropewalk_render::path::{
 };
 use ropewalk_render::{Image, ImageFileError, Monitor, Progress, RenderError, write_image};
 use ropewalk_scene::stage::{Image as Texels, Light, Material, Texture, Wrap};
-use ropewalk_scene::{Camera, NffLimits, Stage, load_scene};
+use ropewalk_scene::{Camera, MeshLimits, NffLimits, Stage, load_scene};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -284,4 +284,28 @@ fn golden_room() {
     made.normals.resize(made.mesh.faces.len(), [[0.0; 3]; 3]);
     let camera = camera([0.0, -4.6, 1.0], [0.0, 0.0, 1.0], 32.0, [128, 128]);
     golden("room", made, &dark(), Some(camera));
+}
+
+/// A file with textures of colour, bumps, metal and roughness, and a camera; it was made for this test.
+#[test]
+fn golden_textured_gltf() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/textured.gltf");
+    let made = Stage::read_monitored(&path, &MeshLimits::DEFAULT, &()).expect("a sound file");
+    let camera = made.camera;
+    assert!(camera.is_some() && made.images.len() == 4);
+    let around = Surroundings { up: Up::Y, backdrop: Backdrop::Sky, ground: false };
+    golden("textured", made, &around, camera);
+}
+
+/// An arcade with eighty lamps, open to the sky on one side.
+#[test]
+fn golden_arcade_of_many_lamps() {
+    let mut made = crate::strategies::corridor();
+    for i in 0..6 {
+        let x = 3.0 + 3.0 * f64::from(i);
+        add_box(&mut made, [x, -1.0, 0.0], [x + 0.3, -0.7, 2.0], 0);
+        add_box(&mut made, [x, 0.5, 0.0], [x + 0.5, 0.9, 0.5], 0);
+    }
+    let camera = camera([0.5, 0.1, 1.1], [8.0, 0.0, 0.9], 75.0, [128, 128]);
+    golden("arcade", made, &under_sky(), Some(camera));
 }
