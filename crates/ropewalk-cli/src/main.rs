@@ -2,11 +2,13 @@
 
 #![forbid(unsafe_code)]
 
+#[macro_use]
+mod output;
+
 mod command;
 mod controls;
 mod engine;
 mod interrupt;
-mod output;
 mod paper;
 mod saved;
 

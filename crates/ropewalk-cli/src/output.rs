@@ -1,5 +1,6 @@
 //! What the command says: one JSON object on standard output, errors on standard error.
 
+use anyhow::Context;
 use ropewalk::build::BuildReport;
 use ropewalk::traverse::Counts;
 use ropewalk_render::RayCounts;
@@ -31,20 +32,41 @@ pub fn fail(error: &anyhow::Error) -> ExitCode {
 
 /// Prints text to standard output; a reader that closes it has seen enough.
 pub fn print_text(text: &str) -> anyhow::Result<()> {
-    use std::io::{ErrorKind, Write};
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error.into()),
-        _ => Ok(()),
-    }
+    write_out(format_args!("{text}")).context("cannot write to standard output")
 }
 
 /// Prints one JSON object to standard output.
 pub fn print_json(value: &impl Serialize) -> anyhow::Result<()> {
-    use std::io::Write;
-    let mut out = std::io::stdout().lock();
-    serde_json::to_writer_pretty(&mut out, value)?;
-    writeln!(out)?;
-    Ok(())
+    print_text(&(serde_json::to_string_pretty(value)? + "\n"))
+}
+
+fn write_out(text: std::fmt::Arguments<'_>) -> std::io::Result<()> {
+    use std::io::{ErrorKind, Write};
+    match std::io::stdout().lock().write_fmt(text) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// What `say!` does; ends the program with exit code 1 if standard output cannot be written.
+pub fn print_part(text: std::fmt::Arguments<'_>) {
+    if let Err(error) = write_out(text) {
+        eprintln!("ropewalk: cannot write to standard output: {error}");
+        std::process::exit(1);
+    }
+}
+
+/// A line on standard output. Unlike `println!` it does not panic where a pipe is closed (`ropewalk ... | head -1`).
+macro_rules! say {
+    ($($part:tt)*) => {{
+        $crate::output::print_part(format_args!($($part)*));
+        $crate::output::print_part(format_args!("\n"));
+    }};
+}
+
+/// `say!` without the end of the line.
+macro_rules! say_part {
+    ($($part:tt)*) => { $crate::output::print_part(format_args!($($part)*)) };
 }
 
 /// How many rays of each kind were cast.

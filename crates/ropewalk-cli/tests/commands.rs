@@ -566,3 +566,34 @@ fn meshes_are_converted_whole_or_not_at_all() {
     assert_eq!(after, before);
     assert_eq!(std::fs::read_to_string(path("a.obj")).unwrap(), BOX);
 }
+
+/// `ropewalk ... | head -1`: who closes the pipe has seen enough.
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("four.obj"), FOUR).unwrap();
+    let small = "--size 8x8 --samples 1 -o a.png";
+    let commands = [
+        "stats spd:tetra:2".to_owned(),
+        "validate spd:tetra:2".to_owned(),
+        "render spd:tetra:2 --size 8x8 -o a.png".to_owned(),
+        format!("render four.obj {small}"),
+        "build spd:tetra:2 --save a.rope".to_owned(),
+        "info a.rope".to_owned(),
+        "info four.obj".to_owned(),
+        "info four.obj --json".to_owned(),
+        format!("render four.obj {small} --json"),
+        "scene tetra --size 2".to_owned(),
+    ];
+    for command in &commands {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let output = Command::new(env!("CARGO_BIN_EXE_ropewalk"))
+            .current_dir(folder.path())
+            .args(command.split(' '))
+            .stdout(writer)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{command}: {}", stderr(&output));
+    }
+}

@@ -278,33 +278,42 @@ fn print_text(o: &Output) -> anyhow::Result<()> {
         n => format!(", steered by {} rays", thousands(n as u64)),
     };
     let Output { scene, preset, level, threads, .. } = o;
-    println!("{scene}, {preset}{model}{rays}, {level}, {threads} thread(s)");
-    println!(
+    say!("{scene}, {preset}{model}{rays}, {level}, {threads} thread(s)");
+    say!(
         "  {} primitives, {:.0} bytes each; seconds: read {:.2}, build {:.2}",
         thousands(o.primitives as u64),
         o.bytes_per_primitive,
         o.seconds.read,
         o.seconds.build
     );
-    println!(
+    say!(
         "  {:10}{:>11}{:>10}{:>9}{:>9}{:>8}{:>8}{:>8}{:>8}{:>8}",
-        "workload", "rays", "Mrays/s", "min", "max", "beams", "steps", "leaves", "blocks", "open"
+        "workload",
+        "rays",
+        "Mrays/s",
+        "min",
+        "max",
+        "beams",
+        "steps",
+        "leaves",
+        "blocks",
+        "open"
     );
     for w in &o.workloads {
-        print!("  {:10}{:>11}", w.name, thousands(w.rays as u64));
+        say_part!("  {:10}{:>11}", w.name, thousands(w.rays as u64));
         if w.rays == 0 {
-            println!("  the view sees nothing to start from");
+            say!("  the view sees nothing to start from");
             continue;
         }
-        print!("{:>10.2}{:>9.2}{:>9.2}", w.median_mrays, w.min_mrays, w.max_mrays);
-        print!("{:>7.0}%", 100.0 * w.beam_share);
+        say_part!("{:>10.2}{:>9.2}{:>9.2}", w.median_mrays, w.min_mrays, w.max_mrays);
+        say_part!("{:>7.0}%", 100.0 * w.beam_share);
         match &w.per_ray {
             Some(e) => {
-                println!("{:>8.2}{:>8.2}{:>8.2}{:>8.3}", e.steps, e.leaves, e.blocks, e.open)
+                say!("{:>8.2}{:>8.2}{:>8.2}{:>8.3}", e.steps, e.leaves, e.blocks, e.open)
             }
-            None => println!("  (at most {FIRST_HITS} hits a ray)"),
+            None => say!("  (at most {FIRST_HITS} hits a ray)"),
         }
     }
-    println!("  Rays per second by the wall clock; events are those of the wave, without beams.");
+    say!("  Rays per second by the wall clock; events are those of the wave, without beams.");
     Ok(())
 }

@@ -80,7 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if args.json {
         return print_json(&output);
     }
-    println!(
+    say!(
         "{}: {}, {} primitives, {} bytes; seconds: read {:.2}, build {:.2}, save {:.2}",
         args.save.display(),
         output.scene,

@@ -195,7 +195,7 @@ impl Output {
     }
 
     fn print(&self) -> anyhow::Result<()> {
-        println!(
+        say!(
             "{}: a saved scene, {} bytes, format {}, tree layout {}",
             self.file,
             thousands(self.bytes),
@@ -203,56 +203,53 @@ impl Output {
             self.layout_version
         );
         let checked = if self.verified { ", all checksums" } else { "" };
-        println!(
-            "  checked         header, sizes and links{checked} ({:.1} ms)",
-            1e3 * self.seconds
-        );
-        println!(
+        say!("  checked         header, sizes and links{checked} ({:.1} ms)", 1e3 * self.seconds);
+        say!(
             "  geometry        {}..., by its bits, {} precision",
-            self.geometry_hash, self.precision
+            self.geometry_hash,
+            self.precision
         );
-        println!(
+        say!(
             "  primitives      {:>12}   of them without area {}",
             thousands(self.primitives as u64),
             thousands(self.degenerate as u64)
         );
         match &self.bounds {
             Some(Corners::Single([low, high])) => {
-                println!("  box             {low:?} to {high:?}");
+                say!("  box             {low:?} to {high:?}");
             }
             Some(Corners::Double([low, high])) => {
-                println!("  box             {low:?} to {high:?}");
+                say!("  box             {low:?} to {high:?}");
             }
             None => {}
         }
-        println!("  treelets        {:>12}", thousands(self.treelets as u64));
-        println!("  blocks          {:>12}", thousands(self.blocks as u64));
-        println!(
-            "  tree                         {:.0} bytes a primitive",
-            self.bytes_per_primitive
-        );
+        say!("  treelets        {:>12}", thousands(self.treelets as u64));
+        say!("  blocks          {:>12}", thousands(self.blocks as u64));
+        say!("  tree                         {:.0} bytes a primitive", self.bytes_per_primitive);
         if let Some(build) = &self.build {
-            println!("  preset          {:>12}", self.preset.unwrap_or("none"));
-            println!("  inner nodes     {:>12}", thousands(build.inner_nodes as u64));
-            println!(
+            say!("  preset          {:>12}", self.preset.unwrap_or("none"));
+            say!("  inner nodes     {:>12}", thousands(build.inner_nodes as u64));
+            say!(
                 "  leaves          {:>12}   empty {}",
                 thousands(build.leaves as u64),
                 thousands(build.empty_leaves as u64)
             );
-            println!(
+            say!(
                 "  references      {:>12}   {:.2} per primitive",
                 thousands(build.references as u64),
                 build.duplication
             );
-            println!("  depth           {:>12}", build.depth);
-            println!(
+            say!("  depth           {:>12}", build.depth);
+            say!(
                 "  a line visits   {:.1} inner nodes, {:.1} leaves, {:.1} primitives (predicted)",
-                build.predicted_steps, build.predicted_leaves, build.predicted_tests
+                build.predicted_steps,
+                build.predicted_leaves,
+                build.predicted_tests
             );
         }
-        println!("  {:8}{:>14}{:>16}  {:18}", "section", "offset", "bytes", "checksum");
+        say!("  {:8}{:>14}{:>16}  {:18}", "section", "offset", "bytes", "checksum");
         for section in &self.sections {
-            println!(
+            say!(
                 "  {:8}{:>14}{:>16}  {}..  {}",
                 section.name,
                 section.offset,

@@ -390,11 +390,11 @@ fn print_text(o: &Output) -> anyhow::Result<()> {
         [one] => one.clone(),
         [first, .., last] => format!("{first} to {last}"),
     };
-    println!("{}, paths: {pictures}", o.scene);
+    say!("{}, paths: {pictures}", o.scene);
     let [width, height] = o.size;
-    println!("  {width} x {height} pixels, {} samples each", o.samples);
+    say!("  {width} x {height} pixels, {} samples each", o.samples);
     let r = &o.rays;
-    println!(
+    say!(
         "  rays     {} primary ({} hit), {} bounced ({} hit), {} shadow ({} hit)",
         thousands(r.primary),
         thousands(r.primary_hits),
@@ -403,13 +403,13 @@ fn print_text(o: &Output) -> anyhow::Result<()> {
         thousands(r.shadow),
         thousands(r.shadow_hits)
     );
-    println!(
+    say!(
         "  speed    {:.2} million rays a second; {:.0} % of the time in traversal, there {:.2} a thread",
         o.mrays,
         100.0 * o.traversal_share,
         o.traversal_mrays
     );
     let s = &o.seconds;
-    println!("  seconds  read {:.2}, build {:.2}, trace {:.2}", s.read, s.build, s.trace);
+    say!("  seconds  read {:.2}, build {:.2}, trace {:.2}", s.read, s.build, s.trace);
     Ok(())
 }

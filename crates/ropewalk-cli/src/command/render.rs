@@ -186,11 +186,11 @@ fn write_aov(picture: &Path, aov: AovKind, done: &Render) -> anyhow::Result<Stri
 
 fn print_text(o: &Output) -> anyhow::Result<()> {
     let Output { rays: r, per_ray: p, seconds: s, .. } = o;
-    println!("{}, {}: {}", o.scene, o.method, o.picture);
+    say!("{}, {}: {}", o.scene, o.method, o.picture);
     for path in &o.aov {
-        println!("  {path}");
+        say!("  {path}");
     }
-    println!(
+    say!(
         "  rays     {} primary ({} hit), {} reflected, {} refracted, {} shadow ({} hit)",
         thousands(r.primary),
         thousands(r.primary_hits),
@@ -199,11 +199,13 @@ fn print_text(o: &Output) -> anyhow::Result<()> {
         thousands(r.shadow),
         thousands(r.shadow_hits)
     );
-    println!(
+    say!(
         "  per ray  {:.2} intersection tests, {:.2} traversal steps, {:.2} leaves",
-        p.intersection_tests, p.traversal_steps, p.leaf_visits
+        p.intersection_tests,
+        p.traversal_steps,
+        p.leaf_visits
     );
-    println!(
+    say!(
         "  seconds  read {:.2}, build {:.2}, trace {:.2} ({:.2} million rays a second)",
         s.read,
         s.build,

@@ -84,27 +84,30 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return print_json(&output);
     }
     let t = &output.tree;
-    println!("{}, {} ({})", output.scene, method.name, method.title);
-    println!(
+    say!("{}, {} ({})", output.scene, method.name, method.title);
+    say!(
         "  primitives      {:>12}   of them without area {}",
         thousands(output.primitives as u64),
         output.degenerate
     );
-    println!("  inner nodes     {:>12}", thousands(t.inner_nodes));
-    println!("  leaves          {:>12}   empty {}", thousands(t.leaves), thousands(t.empty_leaves));
-    println!(
+    say!("  inner nodes     {:>12}", thousands(t.inner_nodes));
+    say!("  leaves          {:>12}   empty {}", thousands(t.leaves), thousands(t.empty_leaves));
+    say!(
         "  references      {:>12}   {:.2} per primitive",
         thousands(t.references),
         output.duplication
     );
-    println!("  depth           {:>12}   mean {:.1}", t.depth, output.mean_leaf_depth);
-    println!("  bytes           {:>12}   ropes included", thousands(t.bytes));
+    say!("  depth           {:>12}   mean {:.1}", t.depth, output.mean_leaf_depth);
+    say!("  bytes           {:>12}   ropes included", thousands(t.bytes));
     if let Some(p) = &output.predicted {
-        println!(
+        say!(
             "  predicted       {:.1} steps, {:.1} leaves ({:.1} empty), {:.1} tests a ray",
-            p.traversal_steps, p.leaf_visits, p.empty_leaf_visits, p.intersection_tests
+            p.traversal_steps,
+            p.leaf_visits,
+            p.empty_leaf_visits,
+            p.intersection_tests
         );
     }
-    println!("  seconds         read {:.2}, build {:.2}", output.seconds.read, t.build_seconds);
+    say!("  seconds         read {:.2}, build {:.2}", output.seconds.read, t.build_seconds);
     Ok(())
 }

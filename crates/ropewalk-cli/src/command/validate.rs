@@ -25,7 +25,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         None => Method::all(),
     };
     let loaded = engine::load(&args.scene)?;
-    println!("{}: {} primitives", loaded.scene.name, loaded.geometry.len());
+    say!("{}: {} primitives", loaded.scene.name, loaded.geometry.len());
     let mut seen = Vec::new();
     for method in methods {
         let threaded = matches!(method.walk, Walk::Ropes | Walk::RopeTrees);
@@ -37,7 +37,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         let engine = engine::build(&loaded.geometry, &method, args.threads)?;
         check(&engine.accelerator).with_context(|| format!("method {}", method.name))?;
         let leaves = engine.report.map_or(0, |r| r.tree.leaves);
-        println!("  {:<24} ok, {leaves} leaves", method.name);
+        say!("  {:<24} ok, {leaves} leaves", method.name);
     }
     Ok(())
 }

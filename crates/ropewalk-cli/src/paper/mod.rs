@@ -87,7 +87,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     }
     std::io::stdout().lock().write_all(table::text(&experiment).as_bytes())?;
     if let Some(path) = &args.output {
-        println!("report: {}", path.display());
+        say!("report: {}", path.display());
     }
     Ok(())
 }

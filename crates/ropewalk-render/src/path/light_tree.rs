@@ -267,8 +267,8 @@ mod tests {
         let of = |i: u32| {
             let low = 4.0 * unit(1000 + i);
             let spread = [0.0, 0.4, PI][i as usize % 3];
-            let high = low + Vec3::splat(if i % 2 == 0 { 0.0 } else { 0.2 });
-            let (axis, two_sided) = (unit(5000 + i), i % 5 == 0);
+            let high = low + Vec3::splat(if i.is_multiple_of(2) { 0.0 } else { 0.2 });
+            let (axis, two_sided) = (unit(5000 + i), i.is_multiple_of(5));
             LightBounds { low, high, axis, spread, intensity: 0.1 + number(i), two_sided }
         };
         (0..n).map(of).collect()

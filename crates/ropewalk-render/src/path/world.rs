@@ -74,6 +74,8 @@ pub struct World {
     ground: Material,
     /// Tables of glass, by material.
     glass: Vec<Option<Glass>>,
+    /// Luminance that each material sends out, the mean of its texture.
+    shine: Vec<f32>,
     has_cutouts: bool,
     environment: Option<Environment>,
     sun: Option<Sun>,
@@ -140,6 +142,7 @@ impl World {
             move_light(light, center, scale);
         }
         let glass = glass_tables(&stage.materials);
+        let shine = shine(&stage);
         let has_cutouts = stage.materials.iter().any(|m| m.alpha != Alpha::Opaque);
         let (environment, has_sun) = match &surroundings.backdrop {
             Backdrop::None => (None, false),
@@ -160,6 +163,7 @@ impl World {
             scale,
             ground,
             glass,
+            shine,
             has_cutouts,
             environment,
             sun: has_sun.then(|| Sun::new(Vec3::Z, SUN)),
@@ -384,17 +388,14 @@ impl World {
 
     /// What a face sends out, in all directions and colours.
     pub(crate) fn emitted_power(&self, face: u32) -> f32 {
-        let material = self.material(face);
-        let plain = Vec3::from_array(material.emission);
-        if plain == Vec3::ZERO {
+        let luminance = self.material_index(face).map_or(0.0, |i| self.shine[i]);
+        if luminance == 0.0 {
             return 0.0;
         }
-        let mean =
-            material.emission_texture.map_or(Vec3::ONE, |t| texture::mean(&self.stage.images, t));
         let [a, b, c] = self.corners(face);
         let area = 0.5 * (b - a).cross(c - a).length() as f32;
-        let sides = if material.two_sided { 2.0 } else { 1.0 };
-        sides * area * std::f32::consts::PI * luminance(plain * mean)
+        let sides = if self.material(face).two_sided { 2.0 } else { 1.0 };
+        sides * area * std::f32::consts::PI * luminance
     }
 
     /// Where a face of some power shines.
@@ -500,6 +501,19 @@ fn move_light(light: &mut Light, center: DVec3, scale: f64) {
         }
         Light::Directional { .. } => {}
     }
+}
+
+/// [`World::shine`].
+fn shine(stage: &Stage) -> Vec<f32> {
+    let of = |material: &Material| {
+        let plain = Vec3::from_array(material.emission);
+        if plain == Vec3::ZERO {
+            return 0.0;
+        }
+        let mean = material.emission_texture.map_or(Vec3::ONE, |t| texture::mean(&stage.images, t));
+        luminance(plain * mean)
+    };
+    stage.materials.iter().map(of).collect()
 }
 
 /// The tables of each material that is rough glass.
