@@ -18,9 +18,9 @@ pub struct Memory {
     owner: Owner,
 }
 
+/// Never looked at again, only kept: all access is by `start`, which another borrow of a map's bytes would end.
 enum Owner {
-    Map(MmapMut),
-    /// Never looked at again, only kept.
+    Map(#[allow(dead_code)] MmapMut),
     Shared(#[allow(dead_code)] SharedBytes),
 }
 
@@ -57,8 +57,12 @@ impl Memory {
 
     /// All bytes, to be written; none of shared ones.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
-        match &mut self.owner {
-            Owner::Map(map) => map,
+        match self.owner {
+            // SAFETY: `start` was made of a `&mut` of all bytes of the map, which is not borrowed again before it is dropped;
+            // `self` is, as long as the slice lives.
+            Owner::Map(_) => unsafe {
+                std::slice::from_raw_parts_mut(self.start.as_ptr(), self.len)
+            },
             Owner::Shared(_) => &mut [],
         }
     }
