@@ -9,6 +9,8 @@ from __future__ import annotations
 import argparse
 import pathlib
 import statistics
+import subprocess
+import sys
 import time
 
 import numpy as np
@@ -114,6 +116,7 @@ def engines(vertices, faces, scene, threads):
             lambda o, d: device.cast_rays(np.hstack([o, d]), nthreads=threads)["primitive_ids"].numpy(),
             list_and_sort,
         )
+    made |= mitsuba_engines(vertices, faces, threads)
     try:
         import trimesh
     except ImportError:
@@ -125,6 +128,50 @@ def engines(vertices, faces, scene, threads):
             lambda o, d: mesh.ray.intersects_id(o, d, multiple_hits=True, max_hits=10_000),
         )
     return made
+
+
+#: Ends well where Mitsuba's LLVM variant works: with some versions of LLVM it ends the process.
+TRY_MITSUBA = """
+import mitsuba as mi, numpy as np
+mi.set_variant("llvm_ad_rgb")
+np.array(mi.render(mi.load_dict(mi.cornell_box()), spp=1))
+"""
+
+
+def mitsuba_engines(vertices, faces, threads):
+    """Mitsuba's two ways, with rays in its own arrays before the first round; none where it does not run."""
+    if subprocess.run([sys.executable, "-c", TRY_MITSUBA], capture_output=True).returncode != 0:
+        print("no Mitsuba with a working LLVM (DRJIT_LIBLLVM_PATH names one); its columns are missing", flush=True)
+        return {}
+    import drjit
+    import mitsuba
+
+    mitsuba.set_variant("llvm_ad_rgb")
+    # The thread that asks works too.
+    drjit.set_thread_count(threads)
+    mesh = mitsuba.Mesh("mesh", len(vertices), len(faces))
+    parts = mitsuba.traverse(mesh)
+    parts["vertex_positions"] = vertices.ravel()
+    parts["faces"] = np.uint32(faces).ravel()
+    parts.update()
+    scene = mitsuba.load_dict({"type": "scene", "mesh": mesh})
+    ready = {}
+
+    def closest(o, d, coherent):
+        if id(o) not in ready:
+            # The arrays are kept, so that no other gets their ids.
+            columns = [array.T.copy() for array in (o, d)]
+            ray = mitsuba.Ray3f(mitsuba.Point3f(columns[0]), mitsuba.Vector3f(columns[1]))
+            drjit.eval(ray)
+            drjit.sync_thread()
+            ready[id(o)] = ray, o
+        found = scene.ray_intersect_preliminary(ready[id(o)][0], coherent=coherent)
+        return np.array(found.prim_index)
+
+    return {
+        "Mitsuba": (lambda o, d: closest(o, d, False), None),
+        "Mitsuba coherent": (lambda o, d: closest(o, d, True), None),
+    }
 
 
 def seconds(work, threads):
