@@ -3,11 +3,12 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::beam::{Eight, FourDoubles};
+use super::beam::{Eight, FourDoubles, larger_size_avx2};
 use super::level::{Found, Nearest, Range, Root, Simd};
 use super::look::look;
 use super::near::near;
 use super::slot::{Loaded, Slot};
+use super::vicinity::Cells;
 use super::x86::{self, Children, Lanes};
 use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
@@ -54,29 +55,24 @@ impl Simd for Avx2 {
         // SAFETY: the caller vouches for the features; the stores lie in the slot (sp + 8 entries
         // fit: STACK's doc).
         unsafe {
-            let Children { code: children, enter, exit, widened } =
-                x86::children::<Avx2>(slot, treelet, sp);
-            let empty = _mm256_cmpeq_epi32(children, _mm256_setzero_si256());
-            let reached = _mm256_cmp_ps::<_CMP_LE_OQ>(enter, widened);
-            let kept = _mm256_andnot_ps(_mm256_castsi256_ps(empty), reached);
-            let mask = _mm256_movemask_ps(kept) as u8;
+            let children = x86::children::<Avx2>(slot, treelet, sp);
+            replace(slot, children, sp)
+        }
+    }
 
-            let lanes = _mm_loadl_epi64(COMPRESS.0.as_ptr().add(mask as usize).cast());
-            let lanes = _mm256_cvtepu8_epi32(lanes);
-            let code = slot.code.as_mut_ptr().add(sp);
-            _mm256_storeu_si256(code.cast(), _mm256_permutevar8x32_epi32(children, lanes));
-            let at = slot.enter.as_mut_ptr().add(sp);
-            _mm256_storeu_ps(at, _mm256_permutevar8x32_ps(enter, lanes));
-            let at = slot.exit.as_mut_ptr().add(sp);
-            _mm256_storeu_ps(at, _mm256_permutevar8x32_ps(exit, lanes));
-            sp + mask.count_ones() as usize - 1
+    #[inline(always)]
+    unsafe fn enter(slot: &mut Slot, cells: &Cells) -> usize {
+        // SAFETY: the caller vouches for the features; there is room for eight entries.
+        unsafe {
+            let children = x86::cells(slot, cells);
+            replace(slot, children, 1)
         }
     }
 
     #[inline(always)]
     unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32 {
         // SAFETY: passed on to the caller.
-        unsafe { look::<Eight, ROUNDED, WHOLE>(slot, block) }
+        unsafe { look::<Eight, &Block, ROUNDED, WHOLE>(slot, block) }
     }
 
     #[inline(always)]
@@ -89,7 +85,7 @@ impl Simd for Avx2 {
     unsafe fn test<const ROUNDED: bool>(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         // SAFETY: the caller vouches for the features; the stores fill the rows of `range`.
         unsafe {
-            let lanes = x86::lanes::<ROUNDED>(slot, block);
+            let lanes = x86::lanes::<Avx2, ROUNDED>(slot, block);
             let limit = _mm256_set1_ps(slot.limit);
             let t_min = _mm256_set1_ps(slot.t_min);
             let meets = meets(&lanes, limit, t_min);
@@ -168,6 +164,29 @@ impl Simd for Avx2 {
     }
 }
 
+/// Puts the children that a ray reaches in place of an entry of its stack; returns the new stack pointer.
+#[inline(always)]
+unsafe fn replace(slot: &mut Slot, children: Children, sp: usize) -> usize {
+    let Children { code: children, enter, exit, widened } = children;
+    // SAFETY: passed on to the caller.
+    unsafe {
+        let empty = _mm256_cmpeq_epi32(children, _mm256_setzero_si256());
+        let reached = _mm256_cmp_ps::<_CMP_LE_OQ>(enter, widened);
+        let kept = _mm256_andnot_ps(_mm256_castsi256_ps(empty), reached);
+        let mask = _mm256_movemask_ps(kept) as u8;
+
+        let lanes = _mm_loadl_epi64(COMPRESS.0.as_ptr().add(mask as usize).cast());
+        let lanes = _mm256_cvtepu8_epi32(lanes);
+        let code = slot.code.as_mut_ptr().add(sp);
+        _mm256_storeu_si256(code.cast(), _mm256_permutevar8x32_epi32(children, lanes));
+        let at = slot.enter.as_mut_ptr().add(sp);
+        _mm256_storeu_ps(at, _mm256_permutevar8x32_ps(enter, lanes));
+        let at = slot.exit.as_mut_ptr().add(sp);
+        _mm256_storeu_ps(at, _mm256_permutevar8x32_ps(exit, lanes));
+        sp + mask.count_ones() as usize - 1
+    }
+}
+
 /// Lanes that the ray may hit between `t_min` and `limit`, as a vector mask.
 #[inline(always)]
 unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> __m256 {
@@ -185,7 +204,7 @@ unsafe fn meets(lanes: &Lanes, limit: __m256, t_min: __m256) -> __m256 {
     }
 }
 
-impl x86::Narrow for Avx2 {
+impl x86::Manner for Avx2 {
     #[inline(always)]
     unsafe fn max<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
         // SAFETY: the caller vouches for the features; max and min return their second operand where
@@ -197,5 +216,11 @@ impl x86::Narrow for Avx2 {
     unsafe fn min<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
         // SAFETY: as above.
         unsafe { _mm256_blend_ps::<LANES>(bound, _mm256_min_ps(t, bound)) }
+    }
+
+    #[inline(always)]
+    unsafe fn larger_size(a: __m256, b: __m256) -> __m256 {
+        // SAFETY: passed on to the caller.
+        unsafe { larger_size_avx2(a, b) }
     }
 }

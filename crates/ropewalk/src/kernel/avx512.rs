@@ -3,13 +3,14 @@
 #![cfg(target_arch = "x86_64")]
 #![allow(unsafe_code)]
 
-use super::beam::{Eight, EightDoubles};
+use super::beam::{Eight512, EightDoubles, Sixteen, larger_size_avx512};
 use super::level::{Found, Nearest, Range, Root, Simd};
 use super::list::{List, Lists};
 use super::look::look;
 use super::near::near;
 use super::order::{order, room};
 use super::slot::{Loaded, Slot};
+use super::vicinity::Cells;
 use super::x86::{self, Children, Lanes};
 use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, Treelet, WIDTH};
@@ -34,18 +35,17 @@ impl Simd for Avx512 {
         // SAFETY: the caller vouches for the features; the stores lie in the slot (sp + 8 entries
         // fit: STACK's doc).
         unsafe {
-            let Children { code: children, enter, exit, widened } =
-                x86::children::<Avx512>(slot, treelet, sp);
-            let used = _mm256_test_epi32_mask(children, children);
-            let mask = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, widened);
+            let children = x86::children::<Avx512>(slot, treelet, sp);
+            replace(slot, children, sp)
+        }
+    }
 
-            let code = slot.code.as_mut_ptr().add(sp);
-            _mm256_storeu_si256(code.cast(), _mm256_maskz_compress_epi32(mask, children));
-            let at = slot.enter.as_mut_ptr().add(sp);
-            _mm256_storeu_ps(at, _mm256_maskz_compress_ps(mask, enter));
-            let at = slot.exit.as_mut_ptr().add(sp);
-            _mm256_storeu_ps(at, _mm256_maskz_compress_ps(mask, exit));
-            sp + mask.count_ones() as usize - 1
+    #[inline(always)]
+    unsafe fn enter(slot: &mut Slot, cells: &Cells) -> usize {
+        // SAFETY: the caller vouches for the features; there is room for eight entries.
+        unsafe {
+            let children = x86::cells(slot, cells);
+            replace(slot, children, 1)
         }
     }
 
@@ -72,20 +72,31 @@ impl Simd for Avx512 {
     #[inline(always)]
     unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32 {
         // SAFETY: passed on to the caller.
-        unsafe { look::<Eight, ROUNDED, WHOLE>(slot, block) }
+        unsafe { look::<Eight512, &Block, ROUNDED, WHOLE>(slot, block) }
+    }
+
+    const TWO: bool = true;
+
+    #[inline(always)]
+    unsafe fn meets_two<const ROUNDED: bool, const WHOLE: bool>(
+        slot: &Slot,
+        blocks: [&Block; 2],
+    ) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe { look::<Sixteen, [&Block; 2], ROUNDED, WHOLE>(slot, blocks) }
     }
 
     #[inline(always)]
     unsafe fn near(slot: &Slot, ray: &Ray, block: &Block) -> u32 {
         // SAFETY: passed on to the caller.
-        unsafe { near::<Eight>(slot, ray, block) }
+        unsafe { near::<Eight512>(slot, ray, block) }
     }
 
     #[inline(always)]
     unsafe fn test<const ROUNDED: bool>(slot: &Slot, block: &Block, range: &mut Range) -> Found {
         // SAFETY: the caller vouches for the features; the stores fill the rows of `range`.
         unsafe {
-            let lanes = x86::lanes::<ROUNDED>(slot, block);
+            let lanes = x86::lanes::<Avx512, ROUNDED>(slot, block);
             let limit = _mm256_set1_ps(slot.limit);
             let t_min = _mm256_set1_ps(slot.t_min);
             let meets = meets(&lanes, limit, t_min);
@@ -180,6 +191,25 @@ impl Simd for Avx512 {
     }
 }
 
+/// Puts the children that a ray reaches in place of an entry of its stack; returns the new stack pointer.
+#[inline(always)]
+unsafe fn replace(slot: &mut Slot, children: Children, sp: usize) -> usize {
+    let Children { code: children, enter, exit, widened } = children;
+    // SAFETY: passed on to the caller.
+    unsafe {
+        let used = _mm256_test_epi32_mask(children, children);
+        let mask = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, enter, widened);
+
+        let code = slot.code.as_mut_ptr().add(sp);
+        _mm256_storeu_si256(code.cast(), _mm256_maskz_compress_epi32(mask, children));
+        let at = slot.enter.as_mut_ptr().add(sp);
+        _mm256_storeu_ps(at, _mm256_maskz_compress_ps(mask, enter));
+        let at = slot.exit.as_mut_ptr().add(sp);
+        _mm256_storeu_ps(at, _mm256_maskz_compress_ps(mask, exit));
+        sp + mask.count_ones() as usize - 1
+    }
+}
+
 /// Appends the lanes of a mask to a list.
 #[inline(always)]
 unsafe fn put(list: &mut List, slot: __m256i, code: __m256i, mask: u8) {
@@ -220,7 +250,7 @@ fn mask<const LANES: i32>() -> __mmask8 {
     mask
 }
 
-impl x86::Narrow for Avx512 {
+impl x86::Manner for Avx512 {
     #[inline(always)]
     unsafe fn max<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
         // SAFETY: the caller vouches for the features.
@@ -231,6 +261,12 @@ impl x86::Narrow for Avx512 {
     unsafe fn min<const LANES: i32>(bound: __m256, t: __m256) -> __m256 {
         // SAFETY: the caller vouches for the features.
         unsafe { _mm256_mask_min_ps(bound, mask::<LANES>(), t, bound) }
+    }
+
+    #[inline(always)]
+    unsafe fn larger_size(a: __m256, b: __m256) -> __m256 {
+        // SAFETY: passed on to the caller.
+        unsafe { larger_size_avx512(a, b) }
     }
 }
 

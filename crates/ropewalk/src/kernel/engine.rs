@@ -22,6 +22,7 @@ use super::slot::Slot;
 use super::sorted::{GROUP, SMALLEST, Sorter, Sorting};
 use super::source::{FromEntry, FromRoot, Search, Source};
 use super::wave::WAVE;
+use super::width::wave_width;
 use crate::geometry::Geometry;
 use crate::point::Cell;
 use crate::point::cells::locate;
@@ -335,10 +336,10 @@ impl<'a> Engine<'a> {
                 }
                 return BatchReport { wave_rays, sorted_rays: wave_rays, ..report };
             }
-            let width = order.len().min(WAVE);
-            let source = &mut FromRoot::new(rays, order);
-            self.wave::<Q, _, _, false>(&mut slots[..width], query, source, &mut NoEvents);
-            BatchReport { wave_rays, ..report }
+            let width = order.len().min(wave_width());
+            let mut source = self.rays_from_root::<Q>(rays, order);
+            self.wave::<Q, _, _, false>(&mut slots[..width], query, &mut source, &mut NoEvents);
+            BatchReport { wave_rays, near_rays: source.near_rays(), ..report }
         })
     }
 
@@ -441,7 +442,7 @@ impl<'a> Engine<'a> {
             return report;
         };
         with_room(|room| {
-            let slots = &mut room.slots[..rays.len().min(WAVE)];
+            let slots = &mut room.slots[..rays.len().min(wave_width())];
             let mut source = FromEntry::new(rays, search);
             self.run_source(slots, query, &mut source, events);
             match source.into_search() {
@@ -461,11 +462,19 @@ impl<'a> Engine<'a> {
         events: &mut E,
     ) {
         with_room(|room| {
-            let slots = &mut room.slots[..rays.len().min(WAVE)];
+            let slots = &mut room.slots[..rays.len().min(wave_width())];
             room.order.clear();
             room.order.extend(0..rays.len() as u32);
-            self.run_source(slots, query, &mut FromRoot::new(rays, &room.order), events);
+            let mut source = self.rays_from_root::<Q>(rays, &room.order);
+            self.run_source(slots, query, &mut source, events);
         });
+    }
+
+    /// Rays from the root, or from cells near them where any hit ends them.
+    fn rays_from_root<'r, Q: BatchQuery>(&self, rays: &'r [Ray], order: &'r [u32]) -> FromRoot<'r> {
+        let source = FromRoot::new(rays, order);
+        let near = Q::ANY && !Q::ROUNDED && self.start == Start::Automatic;
+        if near { source.with_vicinity(self.tree) } else { source }
     }
 
     /// The cells of the rays from `first_ray` on.
@@ -581,8 +590,8 @@ struct Moved<'a, 'e> {
 
 impl Walk for Moved<'_, '_> {
     fn walk<Q: BatchQuery>(self, query: &mut Q) {
-        let slots = &mut self.slots[..self.rays.len().min(WAVE)];
-        let source = &mut FromRoot::new(self.rays, self.order);
-        self.engine.wave::<Q, _, _, false>(slots, query, source, &mut NoEvents);
+        let slots = &mut self.slots[..self.rays.len().min(wave_width())];
+        let mut source = self.engine.rays_from_root::<Q>(self.rays, self.order);
+        self.engine.wave::<Q, _, _, false>(slots, query, &mut source, &mut NoEvents);
     }
 }

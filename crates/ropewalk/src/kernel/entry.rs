@@ -164,7 +164,7 @@ pub struct Path {
 /// by at most `3 u S` (`t dir` is at most `2 S`), another `2 u S` where ranges end one `f32` later than
 /// they say, and `u S` where the widened corner is rounded; the slack of the exact walks is `2^-15` of
 /// `u S`.
-const WIDER: f32 = 8.0 * f32::EPSILON / 2.0;
+pub const WIDER: f32 = 8.0 * f32::EPSILON / 2.0;
 
 impl Path {
     /// The root of a tree, or `None` if it is not a treelet: then there is nothing to search.
@@ -172,7 +172,7 @@ impl Path {
         if tree.root() == 0 || tree.root() & LEAF != 0 {
             return None;
         }
-        let cell = corners(&tree.outer_box());
+        let cell = outer_corners(tree);
         let places = [Place { cell, code: tree.root() }; MAX_WIDE_DEPTH];
         let leaf = Place { cell: Corners::NOTHING, code: 0 };
         Some(Path { leaf, slack: slack_of(tree), depth: 0, places })
@@ -304,15 +304,15 @@ impl Path {
     }
 }
 
-/// A box as it is compared.
-fn corners(bounds: &Aabb) -> Corners {
-    let (low, high) = (bounds.min, bounds.max);
+/// The cell of the root.
+pub fn outer_corners(tree: &WideTree) -> Corners {
+    let Aabb { min: low, max: high } = tree.outer_box();
     let none = f32::NEG_INFINITY;
     Corners([low[0], low[1], low[2], none, -high[0], -high[1], -high[2], none])
 }
 
 /// The slack of the segments in a tree; see [`WIDER`].
-fn slack_of(tree: &WideTree) -> f32 {
+pub fn slack_of(tree: &WideTree) -> f32 {
     let outer = tree.outer_box();
     let coordinates = outer.min.iter().chain(&outer.max).filter(|x| x.is_finite());
     WIDER * coordinates.fold(0.0f32, |a, x| a.max(x.abs())) + TINY

@@ -128,23 +128,27 @@ pub struct Pairs {
 }
 
 /// A ray in the axis order of its shear.
+#[repr(C)]
 #[derive(Clone, Copy, Default)]
 pub struct Sheared {
     /// Axis order.
     k: [u32; 3],
-    origin: [f32; 3],
-    dir: [f32; 3],
     /// Index of the ray in the batch.
     pub ray: u32,
+    origin: [f32; 3],
+    dir: [f32; 3],
 }
 
 impl Sheared {
-    /// The ray of a slot.
+    /// Writes the ray of a slot where it is to be: put together elsewhere number by number and then copied, it
+    /// would be read back before all of it is written, and each ray would wait for that.
     #[inline(always)]
-    pub fn new(slot: &Slot, rays: &[Ray]) -> Self {
+    pub fn set(&mut self, slot: &Slot, rays: &[Ray]) {
         let dir = &rays[slot.ray as usize].dir;
-        let dir = slot.k.map(|a| dir[a.min(2) as usize]);
-        Sheared { k: slot.k, origin: slot.shear_origin, dir, ray: slot.ray }
+        (self.k, self.ray, self.origin) = (slot.k, slot.ray, slot.shear_origin);
+        for (to, k) in self.dir.iter_mut().zip(slot.k) {
+            *to = dir[k.min(2) as usize];
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use super::query::{BatchQuery, Clear};
 use super::slot::Slot;
 use crate::geometry::Geometry;
 use crate::ray::PreparedRay;
-use crate::wide::{Block, ID_MASK, LINE, WIDTH, WideTree};
+use crate::wide::{BLOCK_LINES, Block, ID_MASK, LINE, WIDTH, WideTree};
 
 /// What a leaf is tested with besides the ray.
 #[derive(Clone, Copy)]
@@ -52,6 +52,24 @@ impl Leaves<'_> {
                 (false, true) => L::meets::<false, false>(slot, block),
                 (true, false) => L::meets::<true, true>(slot, block),
                 (true, true) => L::meets::<true, false>(slot, block),
+            }
+        }
+    }
+
+    /// [`Leaves::meet`] for two blocks of triangles in turn, the lanes of the second in bits 15..8.
+    ///
+    /// # Safety
+    /// As for [`Leaves::meet`].
+    #[inline(always)]
+    pub unsafe fn meet_two<L: Simd, Q: BatchQuery>(&self, slot: &Slot, line: usize) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            let blocks = [self.block(line), self.block(line + BLOCK_LINES)];
+            match (Q::ROUNDED, Q::MANY) {
+                (false, false) => L::meets_two::<false, true>(slot, blocks),
+                (false, true) => L::meets_two::<false, false>(slot, blocks),
+                (true, false) => L::meets_two::<true, true>(slot, blocks),
+                (true, true) => L::meets_two::<true, false>(slot, blocks),
             }
         }
     }

@@ -9,6 +9,7 @@ use super::order::order;
 #[cfg(doc)]
 use super::order::room;
 use super::slot::{LARGE, Loaded, Slot};
+use super::vicinity::Cells;
 use crate::aabb::Aabb;
 use crate::ray::Ray;
 use crate::wide::{Block, Treelet, WIDTH};
@@ -179,6 +180,13 @@ pub trait Simd: Locate {
     /// See the trait.
     unsafe fn step(slot: &mut Slot, treelet: &Treelet, sp: usize) -> usize;
 
+    /// Replaces the only entry of the slot's stack by those of some cells that the ray's interval reaches, in any
+    /// order, and returns the new stack pointer.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn enter(slot: &mut Slot, cells: &Cells) -> usize;
+
     /// [`Lists::add`].
     ///
     /// # Safety
@@ -194,6 +202,25 @@ pub trait Simd: Locate {
     /// # Safety
     /// See the trait.
     unsafe fn meets<const ROUNDED: bool, const WHOLE: bool>(slot: &Slot, block: &Block) -> u32;
+
+    /// True if two blocks are looked at side by side in less time than one after the other.
+    const TWO: bool = false;
+
+    /// [`Simd::meets`] for two blocks, the lanes of the second in bits 15..8.
+    ///
+    /// # Safety
+    /// See the trait.
+    #[inline(always)]
+    unsafe fn meets_two<const ROUNDED: bool, const WHOLE: bool>(
+        slot: &Slot,
+        [first, second]: [&Block; 2],
+    ) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            let lanes = Self::meets::<ROUNDED, WHOLE>(slot, first);
+            lanes | Self::meets::<ROUNDED, WHOLE>(slot, second) << WIDTH
+        }
+    }
 
     /// Tests the triangles of a block against the slot's ray, `t_min` and `limit`.
     ///

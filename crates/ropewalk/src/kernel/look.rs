@@ -10,17 +10,48 @@
 use super::beam::Vector;
 use super::level::{DEPTH_SLACK, ROUNDED_DEPTH, ROUNDED_SIZE, WEIGHT_SLACK};
 use super::slot::{Slot, TINY};
-use crate::wide::{Block, WIDTH};
+use crate::wide::Block;
+
+/// Triangles side by side.
+pub trait Triangles<V: Vector>: Copy {
+    /// The coordinates of a vertex along an axis.
+    ///
+    /// # Safety
+    /// The machine must have the features of `V`, and the caller must enable them; `axis` must be below 3.
+    unsafe fn row(self, vertex: usize, axis: usize) -> V;
+}
+
+impl<V: Vector> Triangles<V> for &Block {
+    #[inline(always)]
+    unsafe fn row(self, vertex: usize, axis: usize) -> V {
+        // SAFETY: passed on to the caller; a row has as many numbers as a vector for one block.
+        unsafe { V::load(self.vertex[vertex].get_unchecked(axis)) }
+    }
+}
+
+impl<V: Vector> Triangles<V> for [&Block; 2] {
+    #[inline(always)]
+    unsafe fn row(self, vertex: usize, axis: usize) -> V {
+        let [low, high] = self;
+        // SAFETY: passed on to the caller; a row has half as many numbers as a vector for two blocks.
+        unsafe {
+            V::load_two(
+                low.vertex[vertex].get_unchecked(axis),
+                high.vertex[vertex].get_unchecked(axis),
+            )
+        }
+    }
+}
 
 /// A vertex in the ray's frame: two coordinates across, and its parameter.
 #[inline(always)]
-unsafe fn sheared<V: Vector>(slot: &Slot, vertex: &[[f32; WIDTH]; 3]) -> [V; 3] {
+unsafe fn sheared<V: Vector, T: Triangles<V>>(slot: &Slot, triangles: T, vertex: usize) -> [V; 3] {
     // SAFETY: passed on to the caller; axes are below 3.
     unsafe {
         let [kx, ky, kz] = [slot.k[0] as usize, slot.k[1] as usize, slot.k[2] as usize];
-        let z = V::load(vertex.get_unchecked(kz)) - V::splat(slot.shear_origin[2]);
-        let x = V::load(vertex.get_unchecked(kx)) - V::splat(slot.shear_origin[0]);
-        let y = V::load(vertex.get_unchecked(ky)) - V::splat(slot.shear_origin[1]);
+        let z = triangles.row(vertex, kz) - V::splat(slot.shear_origin[2]);
+        let x = triangles.row(vertex, kx) - V::splat(slot.shear_origin[0]);
+        let y = triangles.row(vertex, ky) - V::splat(slot.shear_origin[1]);
         let x = V::splat(slot.shear[0]).neg_mul_add(z, x);
         let y = V::splat(slot.shear[1]).neg_mul_add(z, y);
         [x, y, V::splat(slot.shear[2]) * z]
@@ -33,30 +64,32 @@ fn edge<V: Vector>(p: [V; 3], q: [V; 3]) -> V {
     p[1].neg_mul_add(q[0], p[0] * q[1])
 }
 
-/// The lanes that the ray of a slot may hit between `t_min` and its limit, and perhaps a few more.
+/// The lanes that the ray of a slot may hit between `t_min` and its limit, and perhaps a few more; of two blocks those of
+/// the first come first.
 ///
 /// `WHOLE` says that triangles are to be dropped, too, that the ray passes through for sure, but behind `t_min`
 /// or beyond the limit: a sixth more work, which pays where many are. `ROUNDED`: see
 /// [`Simd::test`](super::level::Simd::test).
 ///
 /// # Safety
-/// The machine must have the features of `V`, and the caller must enable them; a slot's axes are below 3.
+/// The machine must have the features of `V`, and the caller must enable them; a slot's axes are below 3, and `V` has as
+/// many lanes as there are triangles.
 #[inline(always)]
-pub unsafe fn look<V: Vector, const ROUNDED: bool, const WHOLE: bool>(
+pub unsafe fn look<V: Vector, T: Triangles<V>, const ROUNDED: bool, const WHOLE: bool>(
     slot: &Slot,
-    block: &Block,
+    triangles: T,
 ) -> u32 {
     // SAFETY: passed on to the caller.
     unsafe {
-        let a = sheared::<V>(slot, &block.vertex[0]);
-        let b = sheared::<V>(slot, &block.vertex[1]);
-        let c = sheared::<V>(slot, &block.vertex[2]);
+        let a = sheared::<V, T>(slot, triangles, 0);
+        let b = sheared::<V, T>(slot, triangles, 1);
+        let c = sheared::<V, T>(slot, triangles, 2);
         let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
         let (low, high) = (u.min(v).min(w), u.max(v).max(w));
         let (near, far) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
-        let mut reach = near.abs().max(far.abs());
-        let across = a[0].abs().max(b[0].abs()).max(c[0].abs());
-        let mut sum = across + a[1].abs().max(b[1].abs()).max(c[1].abs());
+        let mut reach = near.larger_size(far);
+        let across = a[0].larger_size(b[0]).larger_size(c[0]);
+        let mut sum = across + a[1].larger_size(b[1]).larger_size(c[1]);
         if ROUNDED {
             reach = reach + V::splat(ROUNDED_DEPTH);
             sum = sum + V::splat(ROUNDED_SIZE);
@@ -95,6 +128,7 @@ mod tests {
     use crate::kernel::random::Random;
     use crate::kernel::slot::Loaded;
     use crate::ray::{PreparedRay, Ray};
+    use crate::wide::WIDTH;
 
     /// The looks of all levels that need no features of the machine: what they share is the arithmetic.
     fn looks(slot: &Slot, block: &Block) -> [u32; 4] {
@@ -102,10 +136,10 @@ mod tests {
         // SAFETY: portable code; `load` sets axes below 3.
         unsafe {
             [
-                look::<L, false, true>(slot, block),
-                look::<L, false, false>(slot, block),
-                look::<L, true, true>(slot, block),
-                look::<L, true, false>(slot, block),
+                look::<L, &Block, false, true>(slot, block),
+                look::<L, &Block, false, false>(slot, block),
+                look::<L, &Block, true, true>(slot, block),
+                look::<L, &Block, true, false>(slot, block),
             ]
         }
     }

@@ -42,7 +42,9 @@ mod single;
 mod slot;
 mod sorted;
 mod source;
+mod vicinity;
 mod wave;
+mod width;
 mod x86;
 
 pub use batch::{AllHits, BatchCaster, BatchHit, Start};
@@ -60,6 +62,7 @@ pub(crate) use query::Crossings;
 pub use query::{HitFilter, Masks, NoFilter, Opacity};
 pub use sorted::Sorting;
 pub(crate) use wave::WAVE;
+pub(crate) use width::wave_width;
 
 /// Asks for the cache line of any address at all, where there is such an instruction.
 #[inline(always)]

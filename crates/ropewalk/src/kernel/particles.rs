@@ -4,6 +4,7 @@ use super::batch::BatchCaster;
 use super::lanes::{Before, Crowd, Lanes, WalkReport};
 use super::query::{Closest, NoFilter};
 use super::wave::WAVE;
+use super::width::wave_width;
 use crate::ray::Ray;
 use rayon::prelude::*;
 
@@ -113,7 +114,7 @@ impl BatchCaster<'_, NoFilter> {
 
     fn walk_here<P: Particle>(&self, particles: &mut [P]) -> WalkReport {
         let (mut t, mut prim) = ([0.0; WAVE], [0; WAVE]);
-        let width = particles.len().min(WAVE);
+        let width = particles.len().min(wave_width());
         let crowd = Particles { particles, of: [usize::MAX; WAVE], next: 0 };
         let mut lanes = Lanes::new(self.tree(), width, crowd);
         self.run_lanes(width, &mut Closest::new(&mut t, &mut prim), &mut lanes);

@@ -9,6 +9,7 @@ use super::level::{
 };
 use super::near::near;
 use super::slot::{Loaded, Slot, TINY, later};
+use super::vicinity::Cells;
 use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
 
@@ -51,6 +52,27 @@ impl Simd for Scalar {
                 slot.code[sp] = code;
                 slot.enter[sp] = enter;
                 slot.exit[sp] = exit;
+                sp += 1;
+            }
+        }
+        sp - 1
+    }
+
+    #[inline(always)]
+    unsafe fn enter(slot: &mut Slot, cells: &Cells) -> usize {
+        let (t_in, t_out) = (slot.enter[1], slot.exit[1]);
+        let mut sp = 1;
+        for (lane, &code) in cells.code.iter().enumerate() {
+            let (mut enter, mut exit) = (t_in, t_out);
+            for (a, side) in cells.side.iter().enumerate() {
+                let t = |side: f32| (side - slot.origin[a]) * slot.inv[a];
+                let near = usize::from(slot.inv[a].is_sign_negative());
+                let (first, last) = (t(side[near][lane]), t(side[1 - near][lane]));
+                enter = if first > enter { first } else { enter };
+                exit = if last < exit { last } else { exit };
+            }
+            if code != 0 && enter <= later(exit) {
+                (slot.code[sp], slot.enter[sp], slot.exit[sp]) = (code, enter, exit);
                 sp += 1;
             }
         }

@@ -200,7 +200,7 @@ impl Slot {
     /// being enough or not.
     ///
     /// Cells are popped in the order in which the ray enters them, so one that starts behind the
-    /// limit ends the ray; except that a ray in a cutting plane is in the cells on both sides at
+    /// limit ends the ray, unless any hit is enough: then the limit stays, and cells need no order. Except that a ray in a cutting plane is in the cells on both sides at
     /// once, and then only each cell by itself can be dropped.
     #[inline(always)]
     pub fn pop(&mut self, any: bool) -> bool {
@@ -210,7 +210,7 @@ impl Slot {
         }
         self.sp = below as u32;
         let behind = earlier(self.enter[below]) - self.near_zero > self.limit;
-        (below == 0) | behind | (any & (self.best_id != u32::MAX))
+        (below == 0) | (!any & behind) | (any & (self.best_id != u32::MAX))
     }
 
     /// The first cell from `below` down that does not start behind the limit. A call, since the compiler

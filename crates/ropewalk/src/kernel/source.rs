@@ -6,6 +6,8 @@ use super::entry::{Climb, Path};
 use super::events::Events;
 use super::level::Simd;
 use super::query::BatchQuery;
+use super::slot::Slot;
+use super::vicinity::Vicinity;
 use crate::point::Cell;
 use crate::ray::Ray;
 use crate::wide::WideTree;
@@ -32,6 +34,21 @@ pub trait Source<Q: BatchQuery> {
         query: &mut Q,
         events: &mut E,
     ) -> Option<(usize, u32)>;
+
+    /// A ray has been put into a slot with its cell alone on the stack, for a query that any hit ends: others may take
+    /// its place there.
+    ///
+    /// # Safety
+    /// As for [`Source::next`]; the slot must hold the ray `index`.
+    #[inline(always)]
+    unsafe fn enter<L: Simd, E: Events>(
+        &mut self,
+        _index: usize,
+        _slot: &mut Slot,
+        _tree: &WideTree,
+        _events: &mut E,
+    ) {
+    }
 }
 
 /// Rays from the root.
@@ -39,12 +56,23 @@ pub struct FromRoot<'a> {
     rays: &'a [Ray],
     /// Indices of the rays still to come.
     order: &'a [u32],
+    vicinity: Option<Vicinity>,
 }
 
 impl<'a> FromRoot<'a> {
     /// The rays with these indices, in this order.
     pub fn new(rays: &'a [Ray], order: &'a [u32]) -> Self {
-        FromRoot { rays, order }
+        FromRoot { rays, order, vicinity: None }
+    }
+
+    /// Short ones that any hit ends may start from cells near them.
+    pub fn with_vicinity(self, tree: &WideTree) -> Self {
+        FromRoot { vicinity: Vicinity::new(tree), ..self }
+    }
+
+    /// How many rays started from such cells.
+    pub fn near_rays(&self) -> u64 {
+        self.vicinity.as_ref().map_or(0, Vicinity::near_rays)
     }
 }
 
@@ -65,6 +93,20 @@ impl<Q: BatchQuery> Source<Q> for FromRoot<'_> {
         let (&index, rest) = self.order.split_first()?;
         self.order = rest;
         Some((index as usize, tree.root()))
+    }
+
+    #[inline(always)]
+    unsafe fn enter<L: Simd, E: Events>(
+        &mut self,
+        index: usize,
+        slot: &mut Slot,
+        tree: &WideTree,
+        events: &mut E,
+    ) {
+        if let Some(vicinity) = &mut self.vicinity {
+            // SAFETY: passed on to the caller.
+            unsafe { vicinity.enter::<L, E>(tree, &self.rays[index], slot, events) };
+        }
     }
 }
 

@@ -23,40 +23,70 @@ use super::leaf::Leaves;
 use super::level::{Root, Simd};
 use super::list::{List, Lists};
 use super::query::BatchQuery;
-use super::slot::{Loaded, Slot};
+use super::slot::{Loaded, STACK, Slot};
 use super::source::Source;
 use crate::geometry::Geometry;
-use crate::wide::{BLOCK_LINES, LINE, WideTree, code_line, code_offset};
+use crate::wide::{BLOCK_LINES, COUNT_OVERFLOW, LINE, WIDTH, WideTree, code_line, code_offset};
 
-/// Rays in flight on a core.
-pub const WAVE: usize = 24;
+/// Most rays in flight on a core.
+pub const WAVE: usize = 32;
 
 /// The share of blocks that must be hit for a test in full at once to be worth its time: measured,
 /// it wins at .4 and above and loses at .3.
 const WORTHWHILE: f64 = 0.375;
 
+/// Most blocks tested at a time: two for each ray.
+const TESTS: usize = 64;
+
+const _: () = assert!(2 * WAVE <= TESTS);
+
 /// Blocks to be tested, each with a number: how many of its leaf are left, or which lanes.
 struct Tests {
-    slot: [u32; 32],
-    line: [u32; 32],
-    number: [u32; 32],
+    slot: [u32; TESTS],
+    line: [u32; TESTS],
+    number: [u32; TESTS],
     len: usize,
 }
 
 impl Tests {
-    const EMPTY: Tests = Tests { slot: [0; 32], line: [0; 32], number: [0; 32], len: 0 };
+    const EMPTY: Tests = Tests { slot: [0; TESTS], line: [0; TESTS], number: [0; TESTS], len: 0 };
 
+    /// Adds an entry, or only writes it where the next one goes.
     #[inline(always)]
-    fn set(&mut self, i: usize, k: u32, line: u32, number: u32) {
-        self.slot[i & 31] = k;
-        self.line[i & 31] = line;
-        self.number[i & 31] = number;
+    fn add(&mut self, k: u32, line: u32, number: u32, stays: bool) {
+        let i = self.len % TESTS;
+        (self.slot[i], self.line[i], self.number[i]) = (k, line, number);
+        self.len += usize::from(stays);
     }
 
     #[inline(always)]
     fn get(&self, i: usize) -> (u32, u32, u32) {
-        (self.slot[i & 31], self.line[i & 31], self.number[i & 31])
+        (self.slot[i % TESTS], self.line[i % TESTS], self.number[i % TESTS])
     }
+}
+
+/// What is under test in a leaf phase; kept, since clearing it would cost as much as a block.
+struct Phase {
+    /// Blocks to be looked at, with the number of their leaf that are left.
+    tests: Tests,
+    /// Of these, the first of two that are looked at side by side.
+    twos: Tests,
+    /// Those to be looked at alone.
+    ones: Tests,
+    /// Blocks to be tested in full, with the lanes.
+    met: Tests,
+    /// Blocks with lanes to be decided.
+    open: Tests,
+}
+
+impl Phase {
+    const EMPTY: Phase = Phase {
+        tests: Tests::EMPTY,
+        twos: Tests::EMPTY,
+        ones: Tests::EMPTY,
+        met: Tests::EMPTY,
+        open: Tests::EMPTY,
+    };
 }
 
 /// A batch on its way.
@@ -75,6 +105,7 @@ struct Wave<'a, Q, S, E> {
     struck: u64,
     /// Rays with the cells that they go to, before they are put on the lists.
     moved: List,
+    phase: Phase,
 }
 
 /// Runs the rays of `source` through `slots.len()` slots, [`WAVE`] at most.
@@ -115,6 +146,7 @@ pub unsafe fn wave<L: Simd, Q: BatchQuery, S: Source<Q>, E: Events, const SHAPES
         tested: 0,
         struck: 0,
         moved: List::EMPTY,
+        phase: Phase::EMPTY,
     };
     loop {
         // SAFETY: passed on to the caller.
@@ -177,9 +209,18 @@ impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
             L::add(&mut self.lists, &self.moved, n);
             for i in (waiting..self.lists.waiting.len).step_by(4) {
                 for i in i..i + 4 {
-                    let block = self.address(self.lists.waiting.get(i).1);
+                    let code = self.lists.waiting.get(i).1;
+                    let block = self.address(code);
                     for line in 1..BLOCK_LINES {
                         L::prefetch(block.wrapping_add(line * LINE));
+                    }
+                    if L::TWO {
+                        // Of leaves of one block the same once more: how many they have cannot be predicted.
+                        let several = code & COUNT_OVERFLOW > 1;
+                        let second = std::hint::select_unpredictable(several, BLOCK_LINES, 0);
+                        for line in second..second + BLOCK_LINES {
+                            L::prefetch(block.wrapping_add(line * LINE));
+                        }
                     }
                 }
             }
@@ -223,65 +264,102 @@ impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
     /// Tests the leaves of the first `n` waiting rays: all first blocks, all second blocks, and so
     /// on, so that no test waits for the outcome of the one before.
     ///
-    /// Each block is only looked at first; few of them hold a triangle that the ray may hit, and
-    /// those are tested again in full. Where a query takes all hits and most blocks have some, they are
+    /// Each block is only looked at first, two of a leaf side by side where the level does that faster; few of
+    /// them hold a triangle that the ray may hit, and those are tested again in full. Where a query takes all hits and most blocks have some, they are
     /// tested in full at once.
     #[inline(always)]
     unsafe fn test_leaves<L: Simd, const SHAPES: bool>(&mut self, n: usize) {
         let exact = Exact { lines: self.tree.lines(), rays: self.source.rays() };
         let leaves = Leaves { tree: self.tree, geometry: self.geometry, exact };
         let slots = self.slots.as_mut_ptr();
-        let mut tests = Tests::EMPTY;
+        let Phase { tests, twos, ones, met, open } = &mut self.phase;
         let many = Q::MANY && self.struck as f64 >= WORTHWHILE * self.tested as f64;
+        let by_two = L::TWO && !SHAPES && !many;
+        tests.len = 0;
         for i in 0..n {
             let (k, code) = self.lists.waiting.get(i);
             let count = self.tree.block_count(code);
-            tests.set(tests.len, k, code_line(code) as u32, count);
-            tests.len += usize::from(count > 0);
+            tests.add(k, code_line(code) as u32, count, count > 0);
         }
         for _ in 0..tests.len {
             self.events.leaf();
         }
         while tests.len > 0 {
             let n = std::mem::take(&mut tests.len);
-            if Q::MANY {
-                self.tested += n as u64;
+            (met.len, open.len) = (0, 0);
+            if by_two {
+                (twos.len, ones.len) = (0, 0);
+                for i in 0..n {
+                    let (k, line, left) = tests.get(i);
+                    twos.add(k, line, left, left > 1);
+                    ones.add(k, line, left, left == 1);
+                }
+                for i in 0..twos.len {
+                    let (k, line, left) = twos.get(i);
+                    self.events.block();
+                    self.events.block();
+                    // SAFETY: lists hold numbers of slots, the codes of a tree lead to its blocks; the
+                    // rest passed on to the caller.
+                    let lanes =
+                        unsafe { leaves.meet_two::<L, Q>(&*slots.add(k as usize), line as usize) };
+                    let (first, second) = (lanes & 0xFF, lanes >> WIDTH);
+                    let block = BLOCK_LINES as u32;
+                    met.add(k, line, first, first != 0);
+                    met.add(k, line + block, second, second != 0);
+                    tests.add(k, line + 2 * block, left - 2, left > 2);
+                }
+                for i in 0..ones.len {
+                    let (k, line, _) = ones.get(i);
+                    self.events.block();
+                    // SAFETY: as above.
+                    let lanes = unsafe {
+                        leaves.meet::<L, Q, SHAPES>(&*slots.add(k as usize), line as usize)
+                    };
+                    met.add(k, line, lanes, lanes != 0);
+                }
+                if Q::MANY {
+                    self.tested += (2 * twos.len + ones.len) as u64;
+                }
+            } else {
+                for i in 0..n {
+                    let (k, line, left) = tests.get(i);
+                    self.events.block();
+                    // SAFETY: as above.
+                    let lanes = unsafe {
+                        let (slot, line) = (&mut *slots.add(k as usize), line as usize);
+                        if many {
+                            let slot = (k, slot);
+                            let (open, struck) = leaves.test_all::<L, Q, E, SHAPES>(
+                                slot,
+                                line,
+                                self.query,
+                                self.events,
+                            );
+                            self.struck += u64::from(struck);
+                            open
+                        } else {
+                            leaves.meet::<L, Q, SHAPES>(slot, line)
+                        }
+                    };
+                    met.add(k, line, lanes, lanes != 0);
+                    tests.add(k, line + BLOCK_LINES as u32, left - 1, left > 1);
+                }
+                if Q::MANY {
+                    self.tested += n as u64;
+                }
             }
-            let (mut met, mut meeting) = (Tests::EMPTY, 0);
-            for i in 0..n {
-                let (k, line, left) = tests.get(i);
-                self.events.block();
-                // SAFETY: lists hold numbers of slots, the codes of a tree lead to its blocks; the
-                // rest passed on to the caller.
-                let lanes = unsafe {
-                    let (slot, line) = (&mut *slots.add(k as usize), line as usize);
-                    if many {
-                        let slot = (k, slot);
-                        let (open, struck) =
-                            leaves.test_all::<L, Q, E, SHAPES>(slot, line, self.query, self.events);
-                        self.struck += u64::from(struck);
-                        open
-                    } else {
-                        leaves.meet::<L, Q, SHAPES>(slot, line)
-                    }
-                };
-                met.set(meeting, k, line, lanes);
-                meeting += usize::from(lanes != 0);
-                tests.set(tests.len, k, line + BLOCK_LINES as u32, left - 1);
-                tests.len += usize::from(left > 1);
-            }
+            let ahead = if by_two { 2 * BLOCK_LINES } else { BLOCK_LINES };
             for i in (0..tests.len).step_by(4) {
                 for i in i..i + 4 {
                     let (_, line, _) = tests.get(i);
                     let block = self.tree.lines().as_ptr().wrapping_add(line as usize * LINE);
-                    for line in 0..BLOCK_LINES {
+                    for line in 0..ahead {
                         // SAFETY: passed on to the caller.
                         unsafe { L::prefetch(block.wrapping_add(line * LINE)) };
                     }
                 }
             }
-            let (mut open, mut unsettled) = (Tests::EMPTY, 0);
-            for i in 0..if many { 0 } else { meeting } {
+            for i in 0..if many { 0 } else { met.len } {
                 let (k, line, lanes) = met.get(i);
                 // SAFETY: as above.
                 let (lanes, struck) = unsafe {
@@ -292,12 +370,11 @@ impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
                 if Q::MANY {
                     self.struck += u64::from(struck);
                 }
-                open.set(unsettled, k, line, lanes);
-                unsettled += usize::from(lanes != 0);
+                open.add(k, line, lanes, lanes != 0);
             }
-            let (open, unsettled) = if many { (&met, meeting) } else { (&open, unsettled) };
-            for i in 0..unsettled {
-                let (k, line, lanes) = open.get(i);
+            let undecided = if many { &*met } else { &*open };
+            for i in 0..undecided.len {
+                let (k, line, lanes) = undecided.get(i);
                 let slot = (k, &mut self.slots[k as usize]);
                 leaves.decide(slot, line as usize, lanes, self.query);
             }
@@ -335,9 +412,19 @@ impl<Q: BatchQuery, S: Source<Q>, E: Events> Wave<'_, Q, S, E> {
                 continue;
             }
             slot.code[1] = code;
-            self.moved.set(n, k, code);
-            (n, self.lists.free.len) = (n + ready, self.lists.free.len - ready);
+            let mut top = code;
+            if Q::ANY {
+                // SAFETY: passed on to the caller; the ray has just been loaded.
+                unsafe { self.source.enter::<L, E>(index, slot, self.tree, self.events) };
+                top = slot.code[slot.sp as usize % STACK];
+            }
             self.events.rays(ready);
+            if Q::ANY && slot.sp == 0 {
+                self.query.miss(index);
+                continue;
+            }
+            self.moved.set(n, k, top);
+            (n, self.lists.free.len) = (n + ready, self.lists.free.len - ready);
         }
         // SAFETY: passed on to the caller.
         unsafe { self.enlist::<L>(n) };

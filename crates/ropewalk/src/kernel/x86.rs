@@ -11,6 +11,7 @@
 
 use super::level::{DEPTH_SLACK, ROUNDED_DEPTH, ROUNDED_SIZE, Root, WEIGHT_SLACK};
 use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
+use super::vicinity::Cells;
 use crate::ray::Ray;
 use crate::wide::{AXIS_SHIFTS, Block, Flips, ORDER, Treelet, WIDTH};
 use std::arch::x86_64::*;
@@ -77,8 +78,7 @@ pub unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loade
 
         let order = SHEAR_ORDER.0.get_unchecked(axis.min(2)).as_ptr();
         let order = _mm_load_si128(order.cast());
-        let inv_z =
-            _mm_div_ps(_mm_set1_ps(1.0), _mm_permutevar_ps(dir, _mm_set1_epi32(axis as i32)));
+        let inv_z = _mm_permutevar_ps(inv, _mm_set1_epi32(axis as i32));
         let shear = _mm_mul_ps(_mm_permutevar_ps(dir, order), inv_z);
         _mm_store_ps(slot.origin.as_mut_ptr(), origin);
         _mm_store_ps(slot.inv.as_mut_ptr(), inv);
@@ -109,11 +109,11 @@ pub struct Children {
     pub widened: __m256,
 }
 
-/// Bounds made narrower in some lanes, as each level does it best.
+/// What each level does in its own manner.
 ///
 /// # Safety
 /// The methods may only run on a machine with the level's features.
-pub trait Narrow {
+pub trait Manner {
     /// The larger of both in the lanes whose bits are set; NaN in `t` leaves the bound.
     ///
     /// # Safety
@@ -125,6 +125,12 @@ pub trait Narrow {
     /// # Safety
     /// See the trait.
     unsafe fn min<const LANES: i32>(bound: __m256, t: __m256) -> __m256;
+
+    /// The larger absolute value.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn larger_size(a: __m256, b: __m256) -> __m256;
 }
 
 /// The step without its last part: masking and compressing.
@@ -132,7 +138,7 @@ pub trait Narrow {
 /// # Safety
 /// The machine must have AVX2 and FMA, and the caller must enable them; `sp` must be on the stack.
 #[inline(always)]
-pub unsafe fn children<N: Narrow>(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
+pub unsafe fn children<M: Manner>(slot: &Slot, treelet: &Treelet, sp: usize) -> Children {
     debug_assert!(sp < super::slot::STACK);
     // SAFETY: the caller vouches for the features; all loads lie in the aligned treelet, the table
     // (index below 128) and the slot.
@@ -157,16 +163,43 @@ pub unsafe fn children<N: Narrow>(slot: &Slot, treelet: &Treelet, sp: usize) -> 
         // A plane at NaN bounds neither side.
         let enter = _mm256_set1_ps(*slot.enter.get_unchecked(sp));
         let exit = _mm256_set1_ps(*slot.exit.get_unchecked(sp));
-        let enter = N::max::<0x0F>(enter, t0);
-        let exit = N::min::<0xF0>(exit, t0);
-        let enter = N::max::<0x33>(enter, t1);
-        let exit = N::min::<0xCC>(exit, t1);
-        let enter = N::max::<0x55>(enter, t2);
-        let exit = N::min::<0xAA>(exit, t2);
+        let enter = M::max::<0x0F>(enter, t0);
+        let exit = M::min::<0xF0>(exit, t0);
+        let enter = M::max::<0x33>(enter, t1);
+        let exit = M::min::<0xCC>(exit, t1);
+        let enter = M::max::<0x55>(enter, t2);
+        let exit = M::min::<0xAA>(exit, t2);
 
         let size = _mm256_andnot_ps(SIGN, exit);
         let widened = _mm256_fmadd_ps(size, _mm256_set1_ps(INTERVAL_SLACK), exit);
         Children { code: children, enter, exit, widened }
+    }
+}
+
+/// The same for eight cells by their sides, from the only entry of the stack.
+///
+/// # Safety
+/// As for [`children`].
+#[inline(always)]
+pub unsafe fn cells(slot: &Slot, cells: &Cells) -> Children {
+    // SAFETY: the caller vouches for the features; all loads are of whole aligned rows.
+    unsafe {
+        let mut enter = _mm256_set1_ps(slot.enter[1]);
+        let mut exit = _mm256_set1_ps(slot.exit[1]);
+        for (a, side) in cells.side.iter().enumerate() {
+            let near = (slot.inv[a].to_bits() >> 31) as usize;
+            let origin = _mm256_set1_ps(slot.origin[a]);
+            let inv = _mm256_set1_ps(slot.inv[a]);
+            let first = _mm256_load_ps(side.get_unchecked(near).as_ptr());
+            let last = _mm256_load_ps(side.get_unchecked(1 - near).as_ptr());
+            // The second operand is returned where the first is NaN.
+            enter = _mm256_max_ps(_mm256_mul_ps(_mm256_sub_ps(first, origin), inv), enter);
+            exit = _mm256_min_ps(_mm256_mul_ps(_mm256_sub_ps(last, origin), inv), exit);
+        }
+        let size = _mm256_andnot_ps(SIGN, exit);
+        let widened = _mm256_fmadd_ps(size, _mm256_set1_ps(INTERVAL_SLACK), exit);
+        let code = _mm256_load_si256(cells.code.as_ptr().cast());
+        Children { code, enter, exit, widened }
     }
 }
 
@@ -228,12 +261,9 @@ unsafe fn edge(p: [__m256; 3], q: [__m256; 3]) -> __m256 {
 
 /// The largest absolute value of three numbers, lane by lane.
 #[inline(always)]
-unsafe fn size(p: __m256, q: __m256, r: __m256) -> __m256 {
+unsafe fn size<M: Manner>(p: __m256, q: __m256, r: __m256) -> __m256 {
     // SAFETY: passed on to the caller.
-    unsafe {
-        let pq = _mm256_max_ps(_mm256_andnot_ps(SIGN, p), _mm256_andnot_ps(SIGN, q));
-        _mm256_max_ps(pq, _mm256_andnot_ps(SIGN, r))
-    }
+    unsafe { M::larger_size(M::larger_size(p, q), r) }
 }
 
 /// The test without its comparisons.
@@ -241,7 +271,7 @@ unsafe fn size(p: __m256, q: __m256, r: __m256) -> __m256 {
 /// # Safety
 /// As for [`children`].
 #[inline(always)]
-pub unsafe fn lanes<const ROUNDED: bool>(slot: &Slot, block: &Block) -> Lanes {
+pub unsafe fn lanes<M: Manner, const ROUNDED: bool>(slot: &Slot, block: &Block) -> Lanes {
     // SAFETY: the caller vouches for the features.
     unsafe {
         let a = sheared(slot, &block.vertex[0]);
@@ -253,12 +283,12 @@ pub unsafe fn lanes<const ROUNDED: bool>(slot: &Slot, block: &Block) -> Lanes {
 
         let near = _mm256_min_ps(_mm256_min_ps(a[2], b[2]), c[2]);
         let far = _mm256_max_ps(_mm256_max_ps(a[2], b[2]), c[2]);
-        let mut reach = _mm256_max_ps(_mm256_andnot_ps(SIGN, near), _mm256_andnot_ps(SIGN, far));
+        let mut reach = M::larger_size(near, far);
         if ROUNDED {
             reach = _mm256_add_ps(reach, _mm256_set1_ps(ROUNDED_DEPTH));
         }
         let blur = _mm256_mul_ps(reach, _mm256_set1_ps(DEPTH_SLACK));
-        let mut sum = _mm256_add_ps(size(a[0], b[0], c[0]), size(a[1], b[1], c[1]));
+        let mut sum = _mm256_add_ps(size::<M>(a[0], b[0], c[0]), size::<M>(a[1], b[1], c[1]));
         if ROUNDED {
             sum = _mm256_add_ps(sum, _mm256_set1_ps(ROUNDED_SIZE));
         }

@@ -1,7 +1,7 @@
 //! Particles with lists of segments, as the lanes of a wave take them.
 
 use super::{Crossed, CrossingFilter, Encounter, Float, WalkerGeometry, end_of};
-use crate::kernel::{BatchCaster, Before, Crossings, Crowd, Lanes, WAVE, WalkReport};
+use crate::kernel::{BatchCaster, Before, Crossings, Crowd, Lanes, WAVE, WalkReport, wave_width};
 use crate::ray::Ray;
 
 /// A crossing of a particle.
@@ -171,7 +171,7 @@ pub type Part<T> = ((Vec<Record<T>>, usize), WalkReport);
 
 /// Moves the particles of a task.
 pub fn walk<G: WalkerGeometry>(caster: &BatchCaster<'_>, lists: Lists<'_, G>) -> Part<G::Float> {
-    let (width, mut query) = (lists.len().min(WAVE), Crossings::new(lists.geometry));
+    let (width, mut query) = (lists.len().min(wave_width()), Crossings::new(lists.geometry));
     let mut lanes = Lanes::new(caster.tree(), width, lists);
     caster.run_lanes(width, &mut query, &mut lanes);
     let (lists, report) = lanes.into_parts();

@@ -10,6 +10,7 @@ mod parts;
 mod ropes;
 mod scenes;
 mod shapes;
+mod vicinity;
 mod walker;
 mod walker_double;
 mod wave;

@@ -82,7 +82,7 @@ impl Facets {
             b[2].store(&mut self.depth[1]);
             c[2].store(&mut self.depth[2]);
             let (near, far) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
-            let away = near.abs().max(far.abs());
+            let away = near.larger_size(far);
             let rounding = V::splat(DEPTH_SLACK) * away;
             rounding.store(&mut self.rounding);
             (near - rounding).store(&mut self.range[0]);
@@ -92,8 +92,8 @@ impl Facets {
             let (low_x, high_x) = (a[0].min(b[0]).min(c[0]), a[0].max(b[0]).max(c[0]));
             let (low_y, high_y) = (a[1].min(b[1]).min(c[1]), a[1].max(b[1]).max(c[1]));
             let (size_x, size_y) = (high_x - low_x, high_y - low_y);
-            let wide_x = V::splat(radius[0]).mul_add(h, low_x.abs().max(high_x.abs()));
-            let wide_y = V::splat(radius[1]).mul_add(h, low_y.abs().max(high_y.abs()));
+            let wide_x = V::splat(radius[0]).mul_add(h, low_x.larger_size(high_x));
+            let wide_y = V::splat(radius[1]).mul_add(h, low_y.larger_size(high_y));
             let across = V::splat(CORNER_SLACK).mul_add(away, V::splat(2.0 * frame.stray));
             let rounded = V::splat(PRODUCT_SLACK) * wide_x * wide_y;
             across.mul_add(wide_x + wide_y, rounded).store(&mut self.slack);

@@ -30,7 +30,9 @@ pub use shaft::BeamSimd;
 pub use vector::Lanes as PortableLanes;
 pub use vector::{Doubles, Vector};
 #[cfg(target_arch = "x86_64")]
-pub use x86::{Eight, EightDoubles, FourDoubles};
+pub use x86::{
+    Eight, Eight512, EightDoubles, FourDoubles, Sixteen, larger_size_avx2, larger_size_avx512,
+};
 
 use super::exact::{At, Exact, place};
 use super::query::{Any, BatchQuery, Closest};
@@ -164,6 +166,8 @@ pub struct BatchReport {
     pub cell_rays: u64,
     /// Rays whose cell led up to the root: of another tree, or far from where the ray goes.
     pub climbed_rays: u64,
+    /// Of these, short occlusion rays that started from a few cells near them, found for many at once.
+    pub near_rays: u64,
     /// Of these, rays that were sorted; see [`Sorting`](super::Sorting).
     pub sorted_rays: u64,
     /// Beams tried.
@@ -190,6 +194,7 @@ impl std::ops::Add for BatchReport {
             entry_rays: self.entry_rays + other.entry_rays,
             cell_rays: self.cell_rays + other.cell_rays,
             climbed_rays: self.climbed_rays + other.climbed_rays,
+            near_rays: self.near_rays + other.near_rays,
             sorted_rays: self.sorted_rays + other.sorted_rays,
             beams: self.beams + other.beams,
             given_up: self.given_up + other.given_up,

@@ -133,10 +133,10 @@ pub unsafe fn behind<V: Vector>(packet: &Packet, lines: &Lines, at: At) -> u32 {
             let dir = V::load(&packet.dir[k]);
             way = n.mul_add(off, way);
             way_size = size.mul_add(off.abs(), way_size);
-            away = away.max(off.abs());
+            away = away.larger_size(off);
             slope = n.mul_add(dir, slope);
             slope_size = size.mul_add(dir.abs(), slope_size);
-            dir_size = dir_size.max(dir.abs());
+            dir_size = dir_size.larger_size(dir);
         }
         let reach = away + V::splat(longest);
         let (terms, reference) = (V::splat(TERMS_SLACK), V::splat(REFERENCE_SLACK));

@@ -22,6 +22,11 @@ pub trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     /// # Safety
     /// As for [`Vector::splat`]; the row must have [`Vector::LANES`] numbers at least.
     unsafe fn load(row: &[f32]) -> Self;
+    /// The first numbers of two rows, half of the lanes from each.
+    ///
+    /// # Safety
+    /// As for [`Vector::splat`]; the rows must have half as many numbers as there are lanes at least.
+    unsafe fn load_two(low: &[f32], high: &[f32]) -> Self;
     /// Writes the lanes to the beginning of a row; panics if it is too short.
     fn store(self, row: &mut [f32]);
     /// Quotient.
@@ -36,6 +41,11 @@ pub trait Vector: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = 
     fn max(self, other: Self) -> Self;
     /// Absolute value.
     fn abs(self) -> Self;
+    /// The larger absolute value; one that is not NaN may be returned where the other is.
+    #[inline(always)]
+    fn larger_size(self, other: Self) -> Self {
+        self.abs().max(other.abs())
+    }
     /// The bits of `self` with the sign flipped where `of` is negative.
     fn flip(self, of: Self) -> Self;
     /// Where `self < other`.
@@ -94,6 +104,10 @@ impl<const N: usize> Vector for Lanes<N> {
     #[inline(always)]
     unsafe fn load(row: &[f32]) -> Self {
         Lanes(std::array::from_fn(|i| row[i]))
+    }
+    #[inline(always)]
+    unsafe fn load_two(low: &[f32], high: &[f32]) -> Self {
+        Lanes(std::array::from_fn(|i| if i < N / 2 { low[i] } else { high[i - N / 2] }))
     }
     #[inline(always)]
     fn store(self, row: &mut [f32]) {
@@ -190,6 +204,11 @@ impl<V: Vector> Vector for Pair<V> {
         unsafe { Pair(V::load(row), V::load(&row[V::LANES..])) }
     }
     #[inline(always)]
+    unsafe fn load_two(low: &[f32], high: &[f32]) -> Self {
+        // SAFETY: passed on to the caller.
+        unsafe { Pair(V::load(low), V::load(high)) }
+    }
+    #[inline(always)]
     fn store(self, row: &mut [f32]) {
         self.0.store(row);
         self.1.store(&mut row[V::LANES..]);
@@ -217,6 +236,10 @@ impl<V: Vector> Vector for Pair<V> {
     #[inline(always)]
     fn abs(self) -> Self {
         Pair(self.0.abs(), self.1.abs())
+    }
+    #[inline(always)]
+    fn larger_size(self, other: Self) -> Self {
+        Pair(self.0.larger_size(other.0), self.1.larger_size(other.1))
     }
     #[inline(always)]
     fn flip(self, of: Self) -> Self {

@@ -20,6 +20,10 @@ use std::ops::{Add, Mul, Range, Sub};
 #[derive(Clone, Copy)]
 pub struct Eight(__m256);
 
+/// The same with AVX-512.
+#[derive(Clone, Copy)]
+pub struct Eight512(__m256);
+
 /// Sixteen lanes of a 512-bit register.
 #[derive(Clone, Copy)]
 pub struct Sixteen(__m512);
@@ -39,6 +43,9 @@ macro_rules! operator {
 operator!(Eight, Add, add, _mm256_add_ps);
 operator!(Eight, Sub, sub, _mm256_sub_ps);
 operator!(Eight, Mul, mul, _mm256_mul_ps);
+operator!(Eight512, Add, add, _mm256_add_ps);
+operator!(Eight512, Sub, sub, _mm256_sub_ps);
+operator!(Eight512, Mul, mul, _mm256_mul_ps);
 operator!(Sixteen, Add, add, _mm512_add_ps);
 operator!(Sixteen, Sub, sub, _mm512_sub_ps);
 operator!(Sixteen, Mul, mul, _mm512_mul_ps);
@@ -135,7 +142,7 @@ doubles! { EightDoubles, 8, _mm512_set1_pd,
 
 /// The methods of a vector; each expression sees the features because a value exists.
 macro_rules! vector {
-    ($type:ident, $lanes:literal, $splat:ident, $load:ident, $store:ident,
+    ($type:ident, $lanes:literal, $splat:ident, $load:ident, $load_two:ident, $store:ident,
      $(fn $name:ident($self:ident $(, $arg:ident: $ty:ty)*) -> $out:ty $body:block)*) => {
         impl Vector for $type {
             const LANES: usize = $lanes;
@@ -149,6 +156,12 @@ macro_rules! vector {
                 debug_assert!(row.len() >= $lanes);
                 // SAFETY: the caller vouches for the features and the length.
                 unsafe { $type($load(row.as_ptr())) }
+            }
+            #[inline(always)]
+            unsafe fn load_two(low: &[f32], high: &[f32]) -> Self {
+                debug_assert!(low.len().min(high.len()) >= $lanes / 2);
+                // SAFETY: the caller vouches for the features and the lengths.
+                unsafe { $type($load_two(low.as_ptr(), high.as_ptr())) }
             }
             #[inline(always)]
             fn store(self, row: &mut [f32]) {
@@ -167,54 +180,104 @@ macro_rules! vector {
     };
 }
 
-vector! { Eight, 8, _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps,
-    fn div(self, by: Self) -> Self { Eight(_mm256_div_ps(self.0, by.0)) }
-    fn mul_add(self, factor: Self, term: Self) -> Self {
-        Eight(_mm256_fmadd_ps(self.0, factor.0, term.0))
-    }
-    fn neg_mul_add(self, factor: Self, term: Self) -> Self {
-        Eight(_mm256_fnmadd_ps(self.0, factor.0, term.0))
-    }
-    fn min(self, other: Self) -> Self { Eight(_mm256_min_ps(self.0, other.0)) }
-    fn max(self, other: Self) -> Self { Eight(_mm256_max_ps(self.0, other.0)) }
-    fn abs(self) -> Self { Eight(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)) }
-    fn flip(self, of: Self) -> Self {
-        Eight(_mm256_xor_ps(self.0, _mm256_and_ps(of.0, _mm256_set1_ps(-0.0))))
-    }
-    fn lt(self, other: Self) -> u32 {
-        _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32
-    }
-    fn le(self, other: Self) -> u32 {
-        _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32
-    }
-    fn equals(self, bits: u32) -> u32 {
-        let same = _mm256_cmpeq_epi32(_mm256_castps_si256(self.0), _mm256_set1_epi32(bits as i32));
-        _mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32
-    }
-    fn select(self, mask: u32, other: Self) -> Self {
-        let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
-        let set = _mm256_and_si256(_mm256_set1_epi32(mask as i32), bit);
-        let set = _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, bit));
-        Eight(_mm256_blendv_ps(other.0, self.0, set))
-    }
-    fn lowest(self) -> f32 {
-        let half = _mm_min_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
-        let pair = _mm_min_ps(half, _mm_movehl_ps(half, half));
-        _mm_cvtss_f32(_mm_min_ss(pair, _mm_movehdup_ps(pair)))
-    }
-    fn highest(self) -> f32 {
-        let half = _mm_max_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
-        let pair = _mm_max_ps(half, _mm_movehl_ps(half, half));
-        _mm_cvtss_f32(_mm_max_ss(pair, _mm_movehdup_ps(pair)))
-    }
-    fn sum(self) -> f32 {
-        let half = _mm_add_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
-        let pair = _mm_add_ps(half, _mm_movehl_ps(half, half));
-        _mm_cvtss_f32(_mm_add_ss(pair, _mm_movehdup_ps(pair)))
+/// Two times four numbers.
+#[inline(always)]
+unsafe fn two_fours(low: *const f32, high: *const f32) -> __m256 {
+    // SAFETY: passed on to the caller.
+    unsafe { _mm256_set_m128(_mm_loadu_ps(high), _mm_loadu_ps(low)) }
+}
+
+/// Two times eight numbers.
+#[inline(always)]
+unsafe fn two_eights(low: *const f32, high: *const f32) -> __m512 {
+    // SAFETY: passed on to the caller.
+    unsafe {
+        _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm256_loadu_ps(low)), _mm256_loadu_ps(high))
     }
 }
 
-vector! { Sixteen, 16, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps,
+/// The larger absolute values, by AVX2.
+///
+/// # Safety
+/// The machine must have AVX2, and the caller must enable it.
+#[inline(always)]
+pub unsafe fn larger_size_avx2(a: __m256, b: __m256) -> __m256 {
+    // SAFETY: passed on to the caller.
+    unsafe {
+        let sign = _mm256_set1_ps(-0.0);
+        _mm256_max_ps(_mm256_andnot_ps(sign, a), _mm256_andnot_ps(sign, b))
+    }
+}
+
+/// The larger absolute values, in one instruction.
+///
+/// # Safety
+/// The machine must have AVX-512 VL and DQ, and the caller must enable them.
+#[inline(always)]
+pub unsafe fn larger_size_avx512(a: __m256, b: __m256) -> __m256 {
+    // SAFETY: passed on to the caller.
+    unsafe { _mm256_range_ps::<LARGER_SIZE>(a, b) }
+}
+
+/// Of `vrangeps`: the larger absolute value, without its sign.
+const LARGER_SIZE: i32 = 0b1011;
+
+/// Eight lanes of a 256-bit register at either level.
+macro_rules! eight {
+    ($type:ident, $larger_size:ident) => {
+        vector! { $type, 8, _mm256_set1_ps, _mm256_loadu_ps, two_fours, _mm256_storeu_ps,
+            fn div(self, by: Self) -> Self { $type(_mm256_div_ps(self.0, by.0)) }
+            fn mul_add(self, factor: Self, term: Self) -> Self {
+                $type(_mm256_fmadd_ps(self.0, factor.0, term.0))
+            }
+            fn neg_mul_add(self, factor: Self, term: Self) -> Self {
+                $type(_mm256_fnmadd_ps(self.0, factor.0, term.0))
+            }
+            fn min(self, other: Self) -> Self { $type(_mm256_min_ps(self.0, other.0)) }
+            fn max(self, other: Self) -> Self { $type(_mm256_max_ps(self.0, other.0)) }
+            fn abs(self) -> Self { $type(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)) }
+            fn larger_size(self, other: Self) -> Self { $type($larger_size(self.0, other.0)) }
+            fn flip(self, of: Self) -> Self {
+                $type(_mm256_xor_ps(self.0, _mm256_and_ps(of.0, _mm256_set1_ps(-0.0))))
+            }
+            fn lt(self, other: Self) -> u32 {
+                _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32
+            }
+            fn le(self, other: Self) -> u32 {
+                _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32
+            }
+            fn equals(self, bits: u32) -> u32 {
+                let same = _mm256_cmpeq_epi32(_mm256_castps_si256(self.0), _mm256_set1_epi32(bits as i32));
+                _mm256_movemask_ps(_mm256_castsi256_ps(same)) as u32
+            }
+            fn select(self, mask: u32, other: Self) -> Self {
+                let bit = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+                let set = _mm256_and_si256(_mm256_set1_epi32(mask as i32), bit);
+                let set = _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, bit));
+                $type(_mm256_blendv_ps(other.0, self.0, set))
+            }
+            fn lowest(self) -> f32 {
+                let half = _mm_min_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+                let pair = _mm_min_ps(half, _mm_movehl_ps(half, half));
+                _mm_cvtss_f32(_mm_min_ss(pair, _mm_movehdup_ps(pair)))
+            }
+            fn highest(self) -> f32 {
+                let half = _mm_max_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+                let pair = _mm_max_ps(half, _mm_movehl_ps(half, half));
+                _mm_cvtss_f32(_mm_max_ss(pair, _mm_movehdup_ps(pair)))
+            }
+            fn sum(self) -> f32 {
+                let half = _mm_add_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+                let pair = _mm_add_ps(half, _mm_movehl_ps(half, half));
+                _mm_cvtss_f32(_mm_add_ss(pair, _mm_movehdup_ps(pair)))
+            }
+        }
+    };
+}
+eight!(Eight, larger_size_avx2);
+eight!(Eight512, larger_size_avx512);
+
+vector! { Sixteen, 16, _mm512_set1_ps, _mm512_loadu_ps, two_eights, _mm512_storeu_ps,
     fn div(self, by: Self) -> Self { Sixteen(_mm512_div_ps(self.0, by.0)) }
     fn mul_add(self, factor: Self, term: Self) -> Self {
         Sixteen(_mm512_fmadd_ps(self.0, factor.0, term.0))
@@ -225,6 +288,9 @@ vector! { Sixteen, 16, _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps,
     fn min(self, other: Self) -> Self { Sixteen(_mm512_min_ps(self.0, other.0)) }
     fn max(self, other: Self) -> Self { Sixteen(_mm512_max_ps(self.0, other.0)) }
     fn abs(self) -> Self { Sixteen(_mm512_abs_ps(self.0)) }
+    fn larger_size(self, other: Self) -> Self {
+        Sixteen(_mm512_range_ps::<LARGER_SIZE>(self.0, other.0))
+    }
     fn flip(self, of: Self) -> Self {
         Sixteen(_mm512_xor_ps(self.0, _mm512_and_ps(of.0, _mm512_set1_ps(-0.0))))
     }
@@ -369,7 +435,7 @@ impl BeamSimd for Avx2 {
 }
 
 impl BeamSimd for Avx512 {
-    type Triangles = Eight;
+    type Triangles = Eight512;
     type Rays = Sixteen;
 
     #[inline(always)]

@@ -142,7 +142,9 @@ impl BatchQuery for Closest<'_> {
         self.prim[slot.ray as usize] = slot.best_id;
         let Some(pending) = self.pending.as_deref_mut() else { return };
         let at = pending.count % (2 * PENDING);
-        pending.rays[at] = (Sheared::new(slot, exact.rays), slot.best_at);
+        let (ray, place) = &mut pending.rays[at];
+        ray.set(slot, exact.rays);
+        *place = slot.best_at;
         pending.count += usize::from(slot.best_at != u32::MAX);
     }
 

@@ -7,7 +7,7 @@ use crate::kernel::exact::{At, Exact, Pairs, Sheared, place};
 use crate::kernel::level::Simd;
 use crate::kernel::order::{hit_of, key, room};
 use crate::kernel::slot::Slot;
-use crate::ray::Hit;
+use crate::ray::{Hit, Ray};
 use crate::wide::WIDTH;
 
 /// All hits in order, or the first `k`: by parameter, and at equal parameters by primitive.
@@ -98,12 +98,15 @@ fn eight(row: &mut [u32], from: usize) -> &mut [u32; WIDTH] {
 impl Finished {
     /// Adds the hits of a ray.
     #[inline(always)]
-    fn push(&mut self, ray: Sheared, found: &Found) {
+    fn push(&mut self, slot: &Slot, rays: &[Ray], found: &Found) {
         let (start, owner) = (self.len, self.rays.len() as u32);
         if start + room(found.len) + WIDTH > self.id.len() {
             self.grow(start + room(found.len) + WIDTH);
         }
-        self.rays.push((ray, start, found.len));
+        self.rays.push((Sheared::default(), start, found.len));
+        if let Some((ray, ..)) = self.rays.last_mut() {
+            ray.set(slot, rays);
+        }
         let mut i = 0;
         while i < found.len {
             eight(&mut self.id, start + i).copy_from_slice(&found.id[i..i + WIDTH]);
@@ -348,7 +351,7 @@ impl BatchQuery for Every {
         }
         self.range[slot.ray as usize] = (0, 0);
         if found.len > 0 {
-            self.finished.push(Sheared::new(slot, exact.rays), found);
+            self.finished.push(slot, exact.rays, found);
         }
         (found.len, found.due) = (0, due(self.first));
     }
