@@ -67,7 +67,7 @@ pub fn trace_paths(
     };
     let mut trace = || {
         if settings.light_choice == LightChoice::Place {
-            integrator.sight = Sight::new(world, &integrator.caster);
+            integrator.sight = Sight::new(world, &integrator.caster, &monitor);
         }
         passes(&integrator, settings, monitor, each_pass)
     };
