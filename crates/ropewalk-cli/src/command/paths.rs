@@ -12,7 +12,7 @@ use ropewalk_render::path::{
     Tone, Up, World, fitted_camera, is_whole_picture, orbited, swept, tessellated, trace_paths,
     write_film,
 };
-use ropewalk_render::{Monitor, Progress, check_image_path};
+use ropewalk_render::{ImageFormat, Monitor, Progress, check_image_path};
 use ropewalk_scene::room::room;
 use ropewalk_scene::{
     Builtin, Camera, Loaded, MeshFormat, MeshLimits, NffLimits, Recognised, Stage, parse_builtin,
@@ -224,7 +224,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let name = stage.name.clone();
     let picture =
         args.output.clone().unwrap_or_else(|| format!("{}.png", name.replace(':', "_")).into());
-    check_image_path(&picture)?;
+    let format = check_image_path(&picture)?;
     let around = options.surroundings(&stage, up)?;
     let camera = options.camera(&stage, args.size, up);
     // Inside, the sky is no measure of what is seen.
@@ -239,6 +239,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         threads: (args.threads > 0).then_some(args.threads),
         lens: Lens { aperture: options.aperture.unwrap_or(0.0), focus: options.focus },
         clamp: options.clamp.map(|x| x as f32),
+        walk_costs: format == ImageFormat::Exr,
         ..PathSettings::default()
     };
     let world = World::new(stage, &around).with_context(|| args.scene.clone())?;

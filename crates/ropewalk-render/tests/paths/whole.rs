@@ -3,7 +3,7 @@
 use crate::common::*;
 use crate::golden::golden;
 use ropewalk_render::path::{
-    Backdrop, Development, Film, PathSettings, Surroundings, Up, World, is_whole_picture,
+    Backdrop, Development, Film, PathSettings, Surroundings, Up, WalkCost, World, is_whole_picture,
     tessellated, trace_paths, write_film,
 };
 use ropewalk_render::{ImageFileError, Monitor, Progress, RenderError};
@@ -56,13 +56,15 @@ fn same(a: &Film, b: &Film) -> bool {
         && a.normal() == b.normal()
         && a.depth() == b.depth()
         && a.face() == b.face()
+        && a.walks() == b.walks()
 }
 
 #[test]
 fn pictures_do_not_depend_on_threads() {
     let made = world(spheres(), &under_sky());
     let with = |threads, seed| {
-        let settings = PathSettings { samples: 6, threads, seed, ..Default::default() };
+        let settings =
+            PathSettings { samples: 6, threads, seed, walk_costs: true, ..Default::default() };
         expose(&made, &view([150, 90]), &settings)
     };
     let one = with(Some(1), 0);
@@ -136,7 +138,7 @@ fn a_time_limit_leaves_the_first_pass_at_least() {
 fn layers_are_written_and_cut_files_are_no_pictures() {
     use exr::prelude::*;
     let folder = tempfile::tempdir().expect("a folder");
-    let settings = PathSettings { samples: 3, ..Default::default() };
+    let settings = PathSettings { samples: 3, walk_costs: true, ..Default::default() };
     let film = expose(&world(spheres(), &under_sky()), &view([20, 10]), &settings);
     let path = folder.path().join("a.exr");
     write_film(&path, &film, &Development::default()).expect("written");
@@ -144,8 +146,8 @@ fn layers_are_written_and_cut_files_are_no_pictures() {
     let names: Vec<_> =
         image.layer_data.channel_data.list.iter().map(|c| c.name.to_string()).collect();
     let expected = [
-        "B", "G", "R", "Z", "albedo.B", "albedo.G", "albedo.R", "id", "normal.X", "normal.Y",
-        "normal.Z", "samples",
+        "B", "G", "R", "Z", "albedo.B", "albedo.G", "albedo.R", "blocks", "id", "normal.X",
+        "normal.Y", "normal.Z", "samples", "steps",
     ];
     assert_eq!(names, expected);
     let channel = |name: &str| {
@@ -155,12 +157,35 @@ fn layers_are_written_and_cut_files_are_no_pictures() {
     assert_eq!(channel("samples"), &FlatSamples::U32(vec![3; 200]));
     assert_eq!(channel("id"), &FlatSamples::U32(film.face().to_vec()));
     assert_eq!(channel("Z"), &FlatSamples::F32(film.depth().to_vec()));
+    let counted = |which: fn(&WalkCost) -> u32| film.walks().iter().map(which).collect();
+    assert_eq!(channel("steps"), &FlatSamples::U32(counted(|w| w.steps)));
+    assert_eq!(channel("blocks"), &FlatSamples::U32(counted(|w| w.blocks)));
     let red = film.radiance().iter().map(|p| p[0]).collect();
     assert_eq!(channel("R"), &FlatSamples::F32(red));
     assert!(is_whole_picture(&path, [20, 10]));
     let bytes = std::fs::read(&path).expect("readable");
     std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("written");
     assert!(!is_whole_picture(&path, [20, 10]));
+}
+
+/// A ray that meets a face has gone through at least one treelet and one block; one that passes by the box through none.
+#[test]
+fn walks_are_counted_when_asked_for() {
+    let made = world(spheres(), &under_sky());
+    let with = |samples, walk_costs| {
+        let settings = PathSettings { samples, walk_costs, ..Default::default() };
+        expose(&made, &camera([0.0, -9.0, 4.0], [0.0, 0.0, 2.0], 70.0, [40, 30]), &settings)
+    };
+    let film = with(1, true);
+    assert_eq!(film.walks().len(), 40 * 30);
+    let (sky, middle) = (film.walks()[0], film.walks()[18 * 40 + 20]);
+    assert_eq!(sky, WalkCost::default());
+    assert!(middle.steps >= 1 && middle.blocks >= 1, "{middle:?}");
+    let most = film.walks().iter().map(|w| w.steps).max();
+    assert!(most > Some(middle.steps.min(2)), "{most:?}");
+    // Samples do not change them, and without asking there are none.
+    assert_eq!(film.walks(), with(4, true).walks());
+    assert!(with(1, false).walks().is_empty());
 }
 
 #[test]
