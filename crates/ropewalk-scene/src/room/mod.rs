@@ -1,7 +1,7 @@
 //! A generated interior: a furnished room by day, with looks, lamps and a view.
 //!
-//! Lengths are metres, `y` is up. The room reaches from the origin to [`SIZE`]; two windows in the wall at `x = 0` are open to
-//! the sky. There is nothing random in it: the same size gives the same triangles.
+//! Lengths are metres, `y` is up. The room is 5.4 wide, 2.9 high and 6.6 deep, from the origin on; two windows in the wall at `x = 0` are
+//! open to the sky. There is nothing random in it: the same size gives the same triangles.
 
 mod furniture;
 mod looks;
