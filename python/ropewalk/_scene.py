@@ -400,7 +400,7 @@ def load(
 ) -> Scene:
     """Loads a scene: a mesh file as :func:`read_mesh` reads it (OBJ, PLY, STL, OFF, glTF), an NFF file,
     both gzipped or not, told apart by content, then by name, or a built-in scene, ``"spd:NAME"`` or
-    ``"spd:NAME:SIZE"`` of the Standard Procedural Databases (Haines 1987).
+    ``"spd:NAME:SIZE"`` of the Standard Procedural Databases (Haines 1987), or the mesh ``"stage:room"``.
 
     Triangle or object ``i`` of the file is primitive ``i`` of one mesh, hit on both sides; polygons,
     spheres, cones and patches of NFF stay what they are, and are always of single precision. The other

@@ -177,6 +177,8 @@ fn the_inputs_fault_is_exit_code_1_and_one_sentence() {
         ("folder.nff", "folder.nff: expected a scene file, found a directory"),
         ("absent.nff", "absent.nff: cannot open the scene file"),
         ("spd:cubes", "spd:cubes: expected a built-in scene (balls, "),
+        ("stage:hall", "stage:hall: expected a built-in stage (room), found"),
+        ("stage:room:17", "stage:room:17: expected a size from 1 to 16 for room, found"),
     ];
     let before = files(folder.path());
     for (scene, sentence) in cases {

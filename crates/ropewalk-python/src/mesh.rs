@@ -4,7 +4,9 @@ use crate::error::Failure;
 use crate::work;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use ropewalk_scene::{Loaded, NffLimits, Recognised, load_monitored, parse_builtin, recognise};
+use ropewalk_scene::{
+    Builtin, Loaded, NffLimits, Recognised, load_monitored, parse_builtin, recognise,
+};
 
 /// Vertices and faces.
 type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
@@ -13,9 +15,11 @@ type Arrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<u32>>);
 #[pyfunction]
 pub fn read_mesh<'py>(py: Python<'py>, path: &str) -> PyResult<Option<Arrays<'py>>> {
     let failed = |error| Failure::File(error).into_exception(true);
-    if parse_builtin(path).map_err(failed)?.is_some()
-        || matches!(recognise(path).map_err(failed)?, Recognised::Nff)
-    {
+    let is_scene = match parse_builtin(path).map_err(failed)? {
+        Some(builtin) => matches!(builtin, Builtin::Spd(..)),
+        None => matches!(recognise(path).map_err(failed)?, Recognised::Nff),
+    };
+    if is_scene {
         return Ok(None);
     }
     let load = |monitor: &work::Stop<'_>| load_monitored(path, &NffLimits::default(), monitor);

@@ -1,5 +1,5 @@
-//! Scenes: a neutral scene model, the NFF reader and writer, readers of triangle meshes, and generators of
-//! the Standard Procedural Databases.
+//! Scenes: a neutral scene model, the NFF reader and writer, readers of triangle meshes, generators of
+//! the Standard Procedural Databases, and a furnished [`room`].
 //!
 //! Readers and generators speak to a [`SceneSink`], so that a scene can be held ([`Scene`]),
 //! written to a file as it is made, or merely counted.
@@ -11,6 +11,7 @@ mod geometry;
 pub mod mesh;
 mod model;
 pub mod nff;
+pub mod room;
 mod sink;
 mod source;
 pub mod spd;
@@ -23,6 +24,6 @@ pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, Scene
 pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};
 pub use nff::{format_g, read_nff};
 pub use source::{
-    Fault, Loaded, SceneError, load, load_monitored, load_scene, parse_builtin, recognise,
+    Builtin, Fault, Loaded, SceneError, load, load_monitored, load_scene, parse_builtin, recognise,
 };
 pub use stage::Stage;

@@ -5,7 +5,9 @@ use crate::mesh::{
 };
 use crate::model::{Material, Object, Scene, Surface};
 use crate::nff::{NffError, NffLimits};
+use crate::room;
 use crate::spd::{self, Spd, SpdError};
+use crate::stage::Stage;
 use crate::watched;
 use flate2::bufread::MultiGzDecoder;
 use ropewalk::build::Monitor;
@@ -15,6 +17,10 @@ use std::path::Path;
 
 /// Prefix of built-in scenes: `spd:NAME[:SIZE]`.
 const BUILTIN_PREFIX: &str = "spd:";
+/// Prefix of built-in stages: `stage:room[:SIZE]`.
+const STAGE_PREFIX: &str = "stage:";
+/// The one there is.
+const ROOM: &str = "room";
 /// Read buffer in bytes: large enough that calls into the system do not show.
 const BUFFER_BYTES: usize = 64 * 1024;
 
@@ -76,6 +82,26 @@ pub enum SceneError {
         /// The size in it.
         size: String,
     },
+    /// There is no built-in stage of that name.
+    #[error("{spec}: expected a built-in stage ({ROOM}), found \"{name}\"")]
+    UnknownStage {
+        /// What the user asked for.
+        spec: String,
+        /// The name in it.
+        name: String,
+    },
+    /// The built-in stage does not exist in that size.
+    #[error(
+        "{spec}: expected a size from {} to {} for {ROOM}, found \"{size}\"",
+        room::SIZES.start(),
+        room::SIZES.end()
+    )]
+    StageSize {
+        /// What the user asked for.
+        spec: String,
+        /// The size in it.
+        size: String,
+    },
     /// The built-in scene has more objects than [`NffLimits::objects`] allows.
     #[error("{spec}: expected at most {limit} objects, found a scene of {objects}")]
     BuiltinTooLarge {
@@ -120,6 +146,8 @@ impl SceneError {
             SceneError::Directory { .. }
             | SceneError::UnknownBuiltin { .. }
             | SceneError::BuiltinSize { .. }
+            | SceneError::UnknownStage { .. }
+            | SceneError::StageSize { .. }
             | SceneError::BuiltinTooLarge { .. } => Fault::Request,
         }
     }
@@ -169,7 +197,7 @@ impl Loaded {
     }
 }
 
-/// Loads a scene or a mesh: `spd:NAME[:SIZE]` is a built-in scene, anything else a file, whose format is told by its content, then
+/// Loads a scene or a mesh: `spd:NAME[:SIZE]` is a built-in scene, `stage:room[:SIZE]` a built-in mesh, anything else a file, whose format is told by its content, then
 /// by its name. Files may be compressed by gzip whatever their names. A scene's
 /// name becomes the file's name without its extensions, or `spd:NAME:SIZE`.
 ///
@@ -188,8 +216,14 @@ pub fn load_monitored(
     limits: &NffLimits,
     monitor: &dyn Monitor,
 ) -> Result<Loaded, SceneError> {
-    if let Some((spd, size)) = parse_builtin(spec)? {
-        return load_builtin(spec, spd, size, limits).map(Loaded::Scene);
+    match parse_builtin(spec)? {
+        Some(Builtin::Spd(spd, size)) => {
+            return load_builtin(spec, spd, size, limits).map(Loaded::Scene);
+        }
+        Some(Builtin::Room(size)) => {
+            return room_of(spec, size).map(|stage| Loaded::Mesh(stage.name, stage.mesh));
+        }
+        None => {}
     }
     match recognise(spec)? {
         Recognised::Mesh(_) => load_mesh(spec, monitor),
@@ -243,29 +277,56 @@ fn load_mesh(spec: &str, monitor: &dyn Monitor) -> Result<Loaded, SceneError> {
     Ok(Loaded::Mesh(stem(path), mesh))
 }
 
-/// The database and size that `spd:NAME[:SIZE]` names, the standard size if none is given; `None`
-/// if `spec` does not begin with `spd:` and so is a path.
+/// What is built in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Builtin {
+    /// A database and its size: `spd:NAME[:SIZE]`.
+    Spd(Spd, u32),
+    /// The [`room`](room::room) of a size: `stage:room[:SIZE]`.
+    Room(u32),
+}
+
+/// The built-in scene that `spd:NAME[:SIZE]` or `stage:room[:SIZE]` names, of the standard size if none is given; `None`
+/// if `spec` begins with neither prefix and so is a path.
 ///
 /// # Errors
-/// [`SceneError::UnknownBuiltin`] and [`SceneError::BuiltinSize`].
-pub fn parse_builtin(spec: &str) -> Result<Option<(Spd, u32)>, SceneError> {
+/// [`SceneError::UnknownBuiltin`], [`SceneError::BuiltinSize`], [`SceneError::UnknownStage`] and
+/// [`SceneError::StageSize`].
+pub fn parse_builtin(spec: &str) -> Result<Option<Builtin>, SceneError> {
+    let parts = |text: &'_ str| match text.split_once(':') {
+        None => (text.to_owned(), None),
+        Some((name, size)) => (name.to_owned(), Some(size.to_owned())),
+    };
+    if let Some(stage) = spec.strip_prefix(STAGE_PREFIX) {
+        let (name, size) = parts(stage);
+        if name != ROOM {
+            return Err(SceneError::UnknownStage { spec: spec.into(), name });
+        }
+        let Some(text) = size else { return Ok(Some(Builtin::Room(room::STANDARD_SIZE))) };
+        return match text.parse() {
+            Ok(size) if room::SIZES.contains(&size) => Ok(Some(Builtin::Room(size))),
+            _ => Err(SceneError::StageSize { spec: spec.into(), size: text }),
+        };
+    }
     let Some(builtin) = spec.strip_prefix(BUILTIN_PREFIX) else {
         return Ok(None);
     };
-    let (name, size) = match builtin.split_once(':') {
-        None => (builtin, None),
-        Some((name, size)) => (name, Some(size)),
-    };
-    let Some(spd) = Spd::from_name(name) else {
-        return Err(SceneError::UnknownBuiltin { spec: spec.into(), name: name.into() });
+    let (name, size) = parts(builtin);
+    let Some(spd) = Spd::from_name(&name) else {
+        return Err(SceneError::UnknownBuiltin { spec: spec.into(), name });
     };
     let Some(text) = size else {
-        return Ok(Some((spd, spd.standard_size())));
+        return Ok(Some(Builtin::Spd(spd, spd.standard_size())));
     };
     match text.parse() {
-        Ok(size) if spd.sizes().contains(&size) => Ok(Some((spd, size))),
-        _ => Err(SceneError::BuiltinSize { spec: spec.into(), spd, size: text.into() }),
+        Ok(size) if spd.sizes().contains(&size) => Ok(Some(Builtin::Spd(spd, size))),
+        _ => Err(SceneError::BuiltinSize { spec: spec.into(), spd, size: text }),
     }
+}
+
+fn room_of(spec: &str, size: u32) -> Result<Stage, SceneError> {
+    let wrong = || SceneError::StageSize { spec: spec.to_owned(), size: size.to_string() };
+    room::room(size).ok_or_else(wrong)
 }
 
 fn load_builtin(spec: &str, spd: Spd, size: u32, limits: &NffLimits) -> Result<Scene, SceneError> {

@@ -33,6 +33,8 @@ pub struct Stage {
     pub lights: Vec<Light>,
     /// The first view of the file.
     pub camera: Option<Camera>,
+    /// True if a sky belongs to it beside the lights of its own, as to a room with windows.
+    pub daylight: bool,
     /// What the reader left out, one sentence a kind.
     pub skipped: Vec<String>,
 }

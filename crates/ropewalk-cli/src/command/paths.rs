@@ -12,9 +12,11 @@ use ropewalk_render::path::{
     Tone, Up, World, fitted_camera, is_whole_picture, orbited, swept, tessellated, trace_paths,
     write_film,
 };
-use ropewalk_render::{Monitor, Progress, check_image_path};
+use ropewalk_render::{ImageFormat, Monitor, Progress, check_image_path};
+use ropewalk_scene::room::room;
 use ropewalk_scene::{
-    Camera, Loaded, MeshFormat, MeshLimits, NffLimits, Recognised, Stage, parse_builtin, recognise,
+    Builtin, Camera, Loaded, MeshFormat, MeshLimits, NffLimits, Recognised, Stage, parse_builtin,
+    recognise,
 };
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -222,10 +224,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let name = stage.name.clone();
     let picture =
         args.output.clone().unwrap_or_else(|| format!("{}.png", name.replace(':', "_")).into());
-    check_image_path(&picture)?;
+    let format = check_image_path(&picture)?;
     let around = options.surroundings(&stage, up)?;
     let camera = options.camera(&stage, args.size, up);
-    let is_lit_by_sky = matches!(around.backdrop, Backdrop::Sky);
+    // Inside, the sky is no measure of what is seen.
+    let is_lit_by_sky = matches!(around.backdrop, Backdrop::Sky) && !stage.daylight;
     let exposure = options.exposure.map(|x| x as f32).or(is_lit_by_sky.then_some(0.0));
     let settings = PathSettings {
         size: camera.resolution,
@@ -236,6 +239,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         threads: (args.threads > 0).then_some(args.threads),
         lens: Lens { aperture: options.aperture.unwrap_or(0.0), focus: options.focus },
         clamp: options.clamp.map(|x| x as f32),
+        walk_costs: format == ImageFormat::Exr,
         ..PathSettings::default()
     };
     let world = World::new(stage, &around).with_context(|| args.scene.clone())?;
@@ -286,7 +290,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 
 /// A stage from a mesh file, or from an NFF scene as triangles; whether `z` is up in files of its kind.
 fn read(spec: &str) -> anyhow::Result<(Stage, bool)> {
-    if parse_builtin(spec)?.is_none()
+    let builtin = parse_builtin(spec)?;
+    if let Some(Builtin::Room(size)) = builtin {
+        let wrong = || usage(format!("{spec}: there is no room of that size"));
+        return Ok((room(size).ok_or_else(wrong)?, false));
+    }
+    if builtin.is_none()
         && let Recognised::Mesh(format) = recognise(spec)?
     {
         let bar = interrupt::bar(1000, "read");

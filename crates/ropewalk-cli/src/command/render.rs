@@ -8,14 +8,14 @@ use ropewalk::method::Method;
 use ropewalk_render::{
     AovKind, Monitor, Render, RenderSettings, check_image_path, render, write_image,
 };
-use ropewalk_scene::{FacetPolicy, Recognised, parse_builtin, recognise};
+use ropewalk_scene::{Builtin, FacetPolicy, Recognised, parse_builtin, recognise};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `render`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A .nff, .obj, .ply, .stl, .off, .gltf or .glb file, also gzipped, or a built-in scene such as spd:balls:4
+    /// A .nff, .obj, .ply, .stl, .off, .gltf or .glb file, also gzipped, or a built-in scene such as spd:balls:4 or stage:room
     pub scene: String,
     /// Picture to write: .png or .exr; SCENE.png in this folder if not given
     #[arg(short, long)]
@@ -92,8 +92,10 @@ struct Output {
 pub fn run(args: &Args) -> anyhow::Result<()> {
     // By content, then by name, as every command tells files.
     let is_mesh = || -> anyhow::Result<bool> {
-        let is_builtin = parse_builtin(&args.scene)?.is_some();
-        Ok(!is_builtin && matches!(recognise(&args.scene)?, Recognised::Mesh(_)))
+        Ok(match parse_builtin(&args.scene)? {
+            Some(builtin) => matches!(builtin, Builtin::Room(_)),
+            None => matches!(recognise(&args.scene)?, Recognised::Mesh(_)),
+        })
     };
     if args.paths.path || (!args.whitted && is_mesh()?) {
         return match args.whitted_option() {

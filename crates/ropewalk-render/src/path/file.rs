@@ -18,7 +18,7 @@ pub struct Development {
 
 /// Writes the picture in the format of the extension, whole or not at all: a PNG for displays, or an EXR of linear
 /// radiance with the layers `albedo` and `normal` and the channels `Z` (distance, infinite where nothing is hit), `id`
-/// (face, [`NO_FACE`](super::NO_FACE) where none is) and `samples`.
+/// (face, [`NO_FACE`](super::NO_FACE) where none is) and `samples`, and `steps` and `blocks` if the film has [`Film::walks`].
 ///
 /// # Errors
 /// [`ImageFileError`]; [`ImageFileError::Cancelled`] if no pass is complete. Nothing is left behind.
@@ -45,6 +45,11 @@ pub fn write_film(path: &Path, film: &Film, how: &Development) -> Result<(), Ima
     planes.push(("Z", Plane::Float(film.depth().to_vec())));
     planes.push(("id", Plane::Whole(film.face().to_vec())));
     planes.push(("samples", Plane::Whole(vec![film.samples(); film.depth().len()])));
+    let walks = film.walks();
+    if !walks.is_empty() {
+        planes.push(("steps", Plane::Whole(walks.iter().map(|w| w.steps).collect())));
+        planes.push(("blocks", Plane::Whole(walks.iter().map(|w| w.blocks).collect())));
+    }
     write_planes(path, film.size(), planes)
 }
 

@@ -29,6 +29,15 @@ impl Cell {
     };
 }
 
+/// What it costs to find what one ray meets first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WalkCost {
+    /// Treelets that the ray steps through: three levels of the tree each.
+    pub steps: u32,
+    /// Blocks of eight triangles that it is tested with.
+    pub blocks: u32,
+}
+
 /// A picture that grows with each pass. It holds complete passes only.
 #[derive(Clone, Debug)]
 pub struct Film {
@@ -39,6 +48,7 @@ pub struct Film {
     normal: Vec<DVec3>,
     depth: Vec<f32>,
     face: Vec<u32>,
+    walks: Vec<WalkCost>,
 }
 
 impl Film {
@@ -52,6 +62,7 @@ impl Film {
             normal: vec![DVec3::ZERO; pixels],
             depth: vec![f32::INFINITY; pixels],
             face: vec![NO_FACE; pixels],
+            walks: Vec::new(),
         }
     }
 
@@ -104,6 +115,16 @@ impl Film {
     /// The face that the first sample meets, those of the ground behind those of the stage; [`NO_FACE`] where none is.
     pub fn face(&self) -> &[u32] {
         &self.face
+    }
+
+    /// What the walk of a ray through each pixel's middle costs; empty unless
+    /// [`PathSettings::walk_costs`](super::PathSettings::walk_costs) asks for it.
+    pub fn walks(&self) -> &[WalkCost] {
+        &self.walks
+    }
+
+    pub(crate) fn set_walks(&mut self, walks: Vec<WalkCost>) {
+        self.walks = walks;
     }
 
     fn means(&self, sums: &[DVec3]) -> Vec<[f32; 3]> {

@@ -13,7 +13,7 @@
 
 use super::bsdf::{Bsdf, Lobes, luminance};
 use super::camera::LensView;
-use super::film::Cell;
+use super::film::{Cell, WalkCost};
 use super::light::Chooser;
 use super::light_tree::Place;
 use super::sampler::{Purpose, Sampler, hash, unit_float};
@@ -209,6 +209,22 @@ impl Integrator<'_> {
                 });
             }
         }
+    }
+
+    /// What the walk of the ray through the middle of a pixel and of the lens costs, alone, not in a wave.
+    pub fn walk_cost(&self, column: u32, row: u32) -> WalkCost {
+        let ray = self.view.ray(f64::from(column) + 0.5, f64::from(row) + 0.5, [0.0; 2]);
+        let events = if self.world.has_cutouts() {
+            let key = Sampler::new(self.seed, row * self.width + column, 0).key() ^ hash(2);
+            let filter = |_: usize, hit: &Hit| {
+                self.world.is_there(hit, || unit_float(hash(key ^ hash(hit.prim_id))))
+            };
+            self.caster.with_filter(filter).closest_hit_one_events(&ray)
+        } else {
+            self.caster.closest_hit_one_events(&ray)
+        };
+        let whole = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
+        WalkCost { steps: whole(events.steps), blocks: whole(events.blocks) }
     }
 
     fn closest_hits(&self, depth: u32, wave: &mut Wave) -> Duration {

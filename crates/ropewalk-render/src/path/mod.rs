@@ -29,7 +29,7 @@ mod world;
 pub use camera::{Lens, Up, fitted_camera, orbited, swept};
 pub use environment::Environment;
 pub use file::{Development, is_whole_picture, write_film};
-pub use film::{Film, NO_FACE};
+pub use film::{Film, NO_FACE, WalkCost};
 pub use integrator::PathCounts;
 pub use render::{PathRender, trace_paths};
 pub use settings::{LightChoice, PathSettings, Strategy};

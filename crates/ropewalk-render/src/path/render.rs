@@ -67,9 +67,16 @@ pub fn trace_paths(
     };
     let mut trace = || {
         if settings.light_choice == LightChoice::Place {
-            integrator.sight = Sight::new(world, &integrator.caster);
+            integrator.sight = Sight::new(world, &integrator.caster, &monitor);
         }
-        passes(&integrator, settings, monitor, each_pass)
+        let mut done = passes(&integrator, settings, monitor, each_pass);
+        if settings.walk_costs && done.film.samples() > 0 {
+            let [width, height] = settings.size;
+            let row = |y: u32| (0..width).map(|x| integrator.walk_cost(x, y)).collect();
+            let rows: Vec<Vec<_>> = (0..height).into_par_iter().map(row).collect();
+            done.film.set_walks(rows.concat());
+        }
+        done
     };
     match settings.threads {
         None => Ok(trace()),

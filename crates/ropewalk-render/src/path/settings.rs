@@ -49,6 +49,8 @@ pub struct PathSettings {
     pub light_choice: LightChoice,
     /// Largest luminance that a path may bring after its first bounce; darkens, but tames bright specks.
     pub clamp: Option<f32>,
+    /// Whether one more ray a pixel is walked with counters, for [`Film::walks`](super::Film::walks).
+    pub walk_costs: bool,
 }
 
 impl Default for PathSettings {
@@ -64,6 +66,7 @@ impl Default for PathSettings {
             strategy: Strategy::Both,
             light_choice: LightChoice::Place,
             clamp: None,
+            walk_costs: false,
         }
     }
 }

@@ -5,6 +5,7 @@
 
 use super::sampler::{hash, unit_float};
 use super::world::World;
+use crate::renderer::Monitor;
 use glam::Vec3;
 use rayon::prelude::*;
 use ropewalk::kernel::BatchCaster;
@@ -26,8 +27,8 @@ pub(crate) struct Sight {
 }
 
 impl Sight {
-    /// Casts the rays; `None` in a world without sky and sun, or with one light alone.
-    pub fn new(world: &World, caster: &BatchCaster<'_>) -> Option<Sight> {
+    /// Casts the rays; `None` in a world without sky and sun, or with one light alone, and once it is cancelled.
+    pub fn new(world: &World, caster: &BatchCaster<'_>, monitor: &Monitor<'_>) -> Option<Sight> {
         let is_needed = world.environment().is_some() || world.sun().is_some();
         if !is_needed || world.lights().len() < 2 {
             return None;
@@ -36,8 +37,11 @@ impl Sight {
         let size = (high - low).max(Vec3::splat(f32::MIN_POSITIVE));
         let cells = (0..CELLS.pow(3) as u32)
             .into_par_iter()
-            .map(|cell| shares_of_cell(world, caster, cell, low, size))
-            .collect();
+            .map(|cell| {
+                let goes_on = !monitor.is_cancelled();
+                goes_on.then(|| shares_of_cell(world, caster, cell, low, size))
+            })
+            .collect::<Option<_>>()?;
         Some(Sight { low, scale: CELLS as f32 / size, cells })
     }
 
@@ -91,4 +95,30 @@ fn rays_of(world: &World, cell: u32, ray: u32, low: Vec3, size: Vec3) -> [Ray; 2
     let sky = sky.map_or(up, |(direction, _)| world.sky_to_world(direction));
     let sun = world.sun().map_or(up, |sun| sun.towards);
     [sky, sun].map(|direction| Ray::new(origin.to_array(), direction.to_array()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::path::{Backdrop, Surroundings, Up};
+    use ropewalk::build::{BuildSettings, Preset};
+    use ropewalk::wide::WideTree;
+    use ropewalk_scene::{Mesh, Stage};
+    use std::sync::atomic::AtomicBool;
+
+    #[test]
+    fn casting_stops_when_cancelled() {
+        let vertices = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 1.0]];
+        let stage = Stage::of_mesh("one".into(), Mesh { vertices, faces: vec![[0, 1, 2]] });
+        let around = Surroundings { up: Up::Z, backdrop: Backdrop::Sky, ground: false };
+        let world = World::new(stage, &around).expect("sound");
+        let settings = BuildSettings::preset(Preset::Balanced);
+        let (tree, _) = WideTree::build(world.geometry(), &settings, &()).expect("built");
+        let caster = BatchCaster::new(&tree, world.geometry()).with_threads(1);
+        for stops in [false, true] {
+            let flag = AtomicBool::new(stops);
+            let monitor = Monitor { progress: None, cancel: Some(&flag) };
+            assert_eq!(Sight::new(&world, &caster, &monitor).is_none(), stops);
+        }
+    }
 }

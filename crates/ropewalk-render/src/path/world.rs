@@ -52,12 +52,12 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// What makes a good picture of a stage: a sky unless it has lights of its own, and then ground unless it has a
+    /// What makes a good picture of a stage: a sky unless it has lights of its own and no daylight, and without lights ground unless it has a
     /// camera of its own.
     pub fn of(stage: &Stage, up: Up) -> Surroundings {
         let shines = stage.materials.iter().any(|m| m.emission.iter().any(|&x| x > 0.0));
         let lit = shines || !stage.lights.is_empty();
-        let backdrop = if lit { Backdrop::None } else { Backdrop::Sky };
+        let backdrop = if lit && !stage.daylight { Backdrop::None } else { Backdrop::Sky };
         Surroundings { up, backdrop, ground: !lit && stage.camera.is_none() }
     }
 }

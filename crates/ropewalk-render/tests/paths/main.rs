@@ -3,6 +3,7 @@
 mod analytic;
 mod common;
 mod furnace;
+mod golden;
 mod looks;
 mod strategies;
 mod whole;

@@ -1,11 +1,12 @@
 //! Threads, passes, interruption, scale, files, golden pictures.
 
 use crate::common::*;
+use crate::golden::golden;
 use ropewalk_render::path::{
-    Backdrop, Development, Film, PathSettings, Surroundings, Tone, Up, World, developed,
-    fitted_camera, is_whole_picture, tessellated, trace_paths, write_film,
+    Backdrop, Development, Film, PathSettings, Surroundings, Up, WalkCost, World, is_whole_picture,
+    tessellated, trace_paths, write_film,
 };
-use ropewalk_render::{Image, ImageFileError, Monitor, Progress, RenderError, write_image};
+use ropewalk_render::{ImageFileError, Monitor, Progress, RenderError};
 use ropewalk_scene::stage::{Image as Texels, Light, Material, Texture, Wrap};
 use ropewalk_scene::{Camera, MeshLimits, NffLimits, Stage, load_scene};
 use std::ops::ControlFlow;
@@ -55,13 +56,15 @@ fn same(a: &Film, b: &Film) -> bool {
         && a.normal() == b.normal()
         && a.depth() == b.depth()
         && a.face() == b.face()
+        && a.walks() == b.walks()
 }
 
 #[test]
 fn pictures_do_not_depend_on_threads() {
     let made = world(spheres(), &under_sky());
     let with = |threads, seed| {
-        let settings = PathSettings { samples: 6, threads, seed, ..Default::default() };
+        let settings =
+            PathSettings { samples: 6, threads, seed, walk_costs: true, ..Default::default() };
         expose(&made, &view([150, 90]), &settings)
     };
     let one = with(Some(1), 0);
@@ -135,7 +138,7 @@ fn a_time_limit_leaves_the_first_pass_at_least() {
 fn layers_are_written_and_cut_files_are_no_pictures() {
     use exr::prelude::*;
     let folder = tempfile::tempdir().expect("a folder");
-    let settings = PathSettings { samples: 3, ..Default::default() };
+    let settings = PathSettings { samples: 3, walk_costs: true, ..Default::default() };
     let film = expose(&world(spheres(), &under_sky()), &view([20, 10]), &settings);
     let path = folder.path().join("a.exr");
     write_film(&path, &film, &Development::default()).expect("written");
@@ -143,8 +146,8 @@ fn layers_are_written_and_cut_files_are_no_pictures() {
     let names: Vec<_> =
         image.layer_data.channel_data.list.iter().map(|c| c.name.to_string()).collect();
     let expected = [
-        "B", "G", "R", "Z", "albedo.B", "albedo.G", "albedo.R", "id", "normal.X", "normal.Y",
-        "normal.Z", "samples",
+        "B", "G", "R", "Z", "albedo.B", "albedo.G", "albedo.R", "blocks", "id", "normal.X",
+        "normal.Y", "normal.Z", "samples", "steps",
     ];
     assert_eq!(names, expected);
     let channel = |name: &str| {
@@ -154,12 +157,35 @@ fn layers_are_written_and_cut_files_are_no_pictures() {
     assert_eq!(channel("samples"), &FlatSamples::U32(vec![3; 200]));
     assert_eq!(channel("id"), &FlatSamples::U32(film.face().to_vec()));
     assert_eq!(channel("Z"), &FlatSamples::F32(film.depth().to_vec()));
+    let counted = |which: fn(&WalkCost) -> u32| film.walks().iter().map(which).collect();
+    assert_eq!(channel("steps"), &FlatSamples::U32(counted(|w| w.steps)));
+    assert_eq!(channel("blocks"), &FlatSamples::U32(counted(|w| w.blocks)));
     let red = film.radiance().iter().map(|p| p[0]).collect();
     assert_eq!(channel("R"), &FlatSamples::F32(red));
     assert!(is_whole_picture(&path, [20, 10]));
     let bytes = std::fs::read(&path).expect("readable");
     std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("written");
     assert!(!is_whole_picture(&path, [20, 10]));
+}
+
+/// A ray that meets a face has gone through at least one treelet and one block; one that passes by the box through none.
+#[test]
+fn walks_are_counted_when_asked_for() {
+    let made = world(spheres(), &under_sky());
+    let with = |samples, walk_costs| {
+        let settings = PathSettings { samples, walk_costs, ..Default::default() };
+        expose(&made, &camera([0.0, -9.0, 4.0], [0.0, 0.0, 2.0], 70.0, [40, 30]), &settings)
+    };
+    let film = with(1, true);
+    assert_eq!(film.walks().len(), 40 * 30);
+    let (sky, middle) = (film.walks()[0], film.walks()[18 * 40 + 20]);
+    assert_eq!(sky, WalkCost::default());
+    assert!(middle.steps >= 1 && middle.blocks >= 1, "{middle:?}");
+    let most = film.walks().iter().map(|w| w.steps).max();
+    assert!(most > Some(middle.steps.min(2)), "{most:?}");
+    // Samples do not change them, and without asking there are none.
+    assert_eq!(film.walks(), with(4, true).walks());
+    assert!(with(1, false).walks().is_empty());
 }
 
 #[test]
@@ -178,53 +204,6 @@ fn stages_that_do_not_hold_together_are_refused() {
     assert!(refused(&|s| s.normals.truncate(5)).contains("normals, one a face, found 5"));
     assert!(refused(&|s| s.images.clear()).contains("one of 0 images, found number 0"));
     assert!(refused(&|s| s.images[0].pixels.truncate(255)).contains("of 256 pixels, found 255"));
-}
-
-/// Largest difference of a channel in 8-bit steps: the platform's math library may round otherwise.
-const CHANNEL_TOLERANCE: u8 = 2;
-
-/// Pixels that may differ by more, of 128 x 128: where such rounding sends a path elsewhere.
-const PIXEL_TOLERANCE: usize = 160;
-
-/// Set this variable to write the golden pictures anew; look at them before they are kept.
-const UPDATE: &str = "ROPEWALK_UPDATE_GOLDEN";
-
-fn golden(name: &str, stage: Stage, around: &Surroundings, camera: Option<Camera>) {
-    let size = [128, 128];
-    let camera = camera.unwrap_or_else(|| fitted_camera(&stage.mesh.vertices, size, around.up));
-    let camera = Camera { resolution: size, ..camera };
-    let settings = PathSettings { samples: 32, clamp: Some(4.0), ..Default::default() };
-    let film = expose(&world(stage, around), &camera, &settings);
-    let exposure = if matches!(around.backdrop, Backdrop::None) {
-        ropewalk_render::path::automatic_exposure(&film)
-    } else {
-        0.0
-    };
-    let seen = developed(&film, exposure, Tone::Agx);
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
-    let path = folder.join(format!("paths_{name}.png"));
-    if std::env::var_os(UPDATE).is_some() {
-        write_image(&path, &seen).expect("written");
-    }
-    let bytes = std::fs::read(&path).expect("the golden picture");
-    let golden = image::load_from_memory(&bytes).expect("a picture").to_rgb8();
-    assert_eq!(golden.dimensions(), (128, 128));
-    let now = seen.to_display_rgb8();
-    let mut diff = Image::filled(128, 128, [0.0; 3]);
-    let mut differing = 0;
-    let pairs = now.chunks_exact(3).zip(golden.pixels());
-    for (pixel, (a, b)) in diff.pixels_mut().iter_mut().zip(pairs) {
-        let apart: [u8; 3] = std::array::from_fn(|c| a[c].abs_diff(b.0[c]));
-        differing += usize::from(apart.iter().any(|&d| d > CHANNEL_TOLERANCE));
-        // Sixteenfold, so that small differences show.
-        *pixel = apart.map(|d| 16.0 * f32::from(d) / 255.0);
-    }
-    if differing > PIXEL_TOLERANCE {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-        write_image(&folder.join(format!("paths_{name}.png")), &seen).expect("written");
-        write_image(&folder.join(format!("paths_{name}.diff.png")), &diff).expect("written");
-        panic!("{differing} pixels differ; see paths_{name}.diff.png in {}", folder.display());
-    }
 }
 
 fn built_in(spec: &str) -> Stage {
@@ -284,6 +263,16 @@ fn golden_room() {
     made.normals.resize(made.mesh.faces.len(), [[0.0; 3]; 3]);
     let camera = camera([0.0, -4.6, 1.0], [0.0, 0.0, 1.0], 32.0, [128, 128]);
     golden("room", made, &dark(), Some(camera));
+}
+
+/// The generated interior by its own view, sky, sun and lamps, with curves of few segments.
+#[test]
+fn golden_interior() {
+    let made = ropewalk_scene::room::room(2).expect("a size that there is");
+    let around = Surroundings::of(&made, Up::Y);
+    assert!(matches!(around.backdrop, Backdrop::Sky) && !around.ground);
+    let camera = made.camera;
+    golden("interior", made, &around, camera);
 }
 
 /// A file with textures of colour, bumps, metal and roughness, and a camera; it was made for this test.
