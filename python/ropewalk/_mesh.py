@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,25 @@ from ._errors import ArgumentTypeError, SceneFileError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+
+class Instances(NamedTuple):
+    """Meshes of a file, each once, and where they are placed; N placements.
+
+    Attributes:
+        meshes: vertices (V, 3) and triangles (F, 3) of each mesh in its own space, in the order of their first
+            placement.
+        mesh: int32, shape (N,): the mesh of each placement, a position in ``meshes``.
+        matrices: float64, shape (N, 3, 4): from the space of the mesh to that of the file.
+        names: N names of nodes, "" where there is none.
+        nodes: int64, shape (N,): the node in the file, -1 where there are no nodes.
+    """
+
+    meshes: list[tuple[NDArray[np.float64], NDArray[np.uint32]]]
+    mesh: NDArray[np.int32]
+    matrices: NDArray[np.float64]
+    names: list[str]
+    nodes: NDArray[np.int64]
 
 
 def as_path(path: str | os.PathLike[str]) -> str:
@@ -54,8 +73,37 @@ def read_mesh(
     name = as_path(path)
     mesh = _ropewalk.read_mesh(name)
     if mesh is None:
-        raise SceneFileError(
-            f"{name}: expected a mesh in OBJ, PLY, STL, OFF or glTF, found a scene, which ropewalk.load reads",
-            "path",
-        )
+        raise _not_a_mesh(name)
     return mesh
+
+
+def read_instances(path: str | os.PathLike[str]) -> Instances:
+    """Meshes of a glTF file, each once, and where its nodes place them (EXT_mesh_gpu_instancing among them).
+    ``ropewalk.load(path, instances=True)`` makes a scene of them; placement ``i`` is ``geom_id`` ``i`` of its hits.
+
+    Meshes without triangles are left out. All placements together, moved by their matrices, are the mesh of
+    :func:`read_mesh`, which swaps the last two corners of triangles that a matrix mirrors. Files of other
+    formats hold one mesh, placed where it is.
+
+    Raises:
+        SceneNotFoundError, SceneFileError: as of :func:`read_mesh`.
+
+    >>> import pathlib, tempfile, ropewalk
+    >>> path = pathlib.Path(tempfile.mkdtemp(), "one.obj")
+    >>> _ = path.write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\n")
+    >>> found = ropewalk.read_instances(path)
+    >>> len(found.meshes), found.mesh, found.matrices.shape
+    (1, array([0], dtype=int32), (1, 3, 4))
+    """
+    name = as_path(path)
+    found = _ropewalk.read_instances(name)
+    if found is None:
+        raise _not_a_mesh(name)
+    return Instances(*found)
+
+
+def _not_a_mesh(name: str) -> SceneFileError:
+    return SceneFileError(
+        f"{name}: expected a mesh in OBJ, PLY, STL, OFF or glTF, found a scene, which ropewalk.load reads",
+        "path",
+    )

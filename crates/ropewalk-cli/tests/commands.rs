@@ -470,6 +470,13 @@ fn mesh_files_are_rendered_and_timed() {
 const BOX: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 0.1\nv 9 9 9\n\
     vn 0 0 1\nusemtl paint\nf 1//1 3 4 2\nf 1 2 6 5\nf 3 7 8 4\nusemtl other\nf 1 5 7 3\nf 2 4 8 6\n";
 
+/// A triangle in glTF that three nodes place.
+const PLACED: &str = r#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+    "nodes":[{"mesh":0},{"mesh":0,"translation":[2,0,0],"children":[2]},{"mesh":0,"translation":[2,0,0]}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+    "bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,
+    "uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
 #[test]
 fn meshes_are_explained() {
     let folder = tempfile::tempdir().unwrap();
@@ -506,6 +513,14 @@ fn meshes_are_explained() {
     ] {
         assert!(text.contains(part), "{text}");
     }
+    assert!(!text.contains("placed"), "one mesh where it is: {text}");
+    std::fs::write(folder.path().join("b.gltf"), PLACED).unwrap();
+    let json: Value = serde_json::from_str(&run(&["info", "b.gltf", "--json"])).unwrap();
+    assert_eq!((&json["meshes"], &json["placements"]), (&1.into(), &3.into()));
+    assert_eq!((&json["vertices"], &json["triangles"]), (&9.into(), &3.into()));
+    let text = run(&["info", "b.gltf"]);
+    let line = |what: &str| text.lines().find(|line| line.trim_start().starts_with(what)).unwrap();
+    assert!(line("meshes").ends_with(" 1") && line("placed").ends_with(" 3"), "{text}");
     let scene: Value = serde_json::from_str(&run(&["info", "spd:balls:1", "--json"])).unwrap();
     assert_eq!((&scene["kind"], &scene["spheres"]), (&"scene".into(), &10.into()));
     std::fs::write(folder.path().join("x"), "Dear reader").unwrap();

@@ -33,6 +33,11 @@ pub struct Stage {
     pub lights: Vec<Light>,
     /// The first view of the file.
     pub camera: Option<Camera>,
+    /// Meshes with triangles that the file's nodes place, and how often in all; 1 each where a format has no nodes, 0 if the
+    /// stage is not from a file.
+    pub meshes: usize,
+    /// See `meshes`.
+    pub placements: usize,
     /// What the reader left out, one sentence a kind.
     pub skipped: Vec<String>,
 }

@@ -6,35 +6,55 @@
 
 mod accessor;
 mod material;
+mod matrix;
 mod node;
+mod placement;
 
 use super::Watched;
 use super::beside::Beside;
 use super::error::{Place, Result, wrong};
 use super::picture::Pictures;
+use super::placed::{IDENTITY, Matrix, PlacedMeshes, is_mirrored, moved};
 use super::soup::Soup;
 use crate::stage::Stage;
 use accessor::Kinds;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use material::{Map, Materials};
+use matrix::{cofactors, small};
+use placement::{Kept, Target};
 use serde_json::Value;
 use std::borrow::Cow;
-
-/// Deepest nesting of nodes.
-const MAX_DEPTH: usize = 256;
+use std::collections::HashSet;
 
 /// Extensions without which positions cannot be read.
 const COMPRESSED: [&str; 3] =
     ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// A transform, row by row.
-type Matrix = [[f64; 4]; 3];
-
-const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-
 /// What a file says: a mesh in a stage, with looks if the soup has some.
 pub fn parse(bytes: &[u8], soup: Soup, beside: &Beside<'_>, limits: &Watched<'_>) -> Result<Stage> {
+    with_reader(bytes, Target::Flat, soup, beside, limits, |reader| reader.finish())
+}
+
+/// Meshes that nodes name, each once, and where they are placed.
+pub fn parse_placed(
+    bytes: &[u8],
+    beside: &Beside<'_>,
+    limits: &Watched<'_>,
+) -> Result<PlacedMeshes> {
+    let target = Target::Kept(Kept::default());
+    with_reader(bytes, target, Soup::new(false), beside, limits, |reader| reader.finish_placed())
+}
+
+/// Follows the nodes of a file; what was read goes to `finish`.
+fn with_reader<T>(
+    bytes: &[u8],
+    target: Target,
+    soup: Soup,
+    beside: &Beside<'_>,
+    limits: &Watched<'_>,
+    finish: impl FnOnce(Reader<'_>) -> Result<T>,
+) -> Result<T> {
     let (json, bin) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let json: Value = serde_json::from_slice(json)
         .map_err(|e| wrong(Place::Line(e.line() as u64), "a glTF file: binary, or JSON text", e))?;
@@ -61,11 +81,14 @@ pub fn parse(bytes: &[u8], soup: Soup, beside: &Beside<'_>, limits: &Watched<'_>
         soup,
         materials: Materials::default(),
         stage: Stage::default(),
+        target,
+        seen: HashSet::new(),
+        placements: 0,
         limits,
     };
     reader.load_buffers(bin)?;
     reader.visit_scene()?;
-    reader.finish()
+    finish(reader)
 }
 
 /// The JSON and the binary chunk of a GLB file.
@@ -107,8 +130,13 @@ struct Reader<'a> {
     is_quantized: bool,
     soup: Soup,
     materials: Materials,
-    /// Lights and the view.
+    /// Lights, the view, and how many meshes have been placed.
     stage: Stage,
+    target: Target,
+    /// Meshes with triangles that have been placed.
+    seen: HashSet<usize>,
+    /// Placements so far, those of meshes without triangles too.
+    placements: usize,
     limits: &'a Watched<'a>,
 }
 
@@ -177,68 +205,12 @@ impl<'a> Reader<'a> {
         };
         node::note_skipped(json, &mut soup);
         let dressed = soup.stage(limits)?;
-        let (lights, camera) = (stage.lights, stage.camera);
-        Ok(Stage { materials, images, lights, camera, ..dressed })
+        let Stage { lights, camera, meshes, placements, .. } = stage;
+        Ok(Stage { materials, images, lights, camera, meshes, placements, ..dressed })
     }
 
-    /// Reads the meshes of the default scene, or of all root nodes, or all of them where there are no nodes.
-    fn visit_scene(&mut self) -> Result<()> {
-        let (json, nodes) = (self.json, array(self.json, "nodes"));
-        if nodes.is_empty() {
-            for mesh in 0..array(json, "meshes").len() {
-                self.read_mesh(mesh, &IDENTITY, "meshes")?;
-            }
-            return Ok(());
-        }
-        let roots: Vec<usize> = if array(json, "scenes").is_empty() {
-            let mut is_child = vec![false; nodes.len()];
-            let children = nodes.iter().flat_map(|node| array(node, "children"));
-            for child in children.filter_map(Value::as_u64) {
-                if let Some(child) = is_child.get_mut(child as usize) {
-                    *child = true;
-                }
-            }
-            (0..nodes.len()).filter(|&i| !is_child[i]).collect()
-        } else {
-            let scene = integer(json, "scene", "scene")?.unwrap_or(0);
-            self.list(entry(json, "scenes", scene, "scene")?, "nodes", &format!("scenes[{scene}]"))?
-        };
-        let mut seen = vec![false; nodes.len()];
-        let mut stack: Vec<(usize, Matrix, usize)> =
-            roots.into_iter().rev().map(|root| (root, IDENTITY, 0)).collect();
-        while let Some((index, above, depth)) = stack.pop() {
-            let name = format!("nodes[{index}]");
-            let node = entry(json, "nodes", index, "nodes")?;
-            if std::mem::replace(&mut seen[index], true) {
-                return Err(wrong(part(name), "a node with one parent", "one that is named twice"));
-            }
-            if depth > MAX_DEPTH {
-                return Err(wrong(part(name), format!("nodes at most {MAX_DEPTH} deep"), "more"));
-            }
-            let matrix = times(&above, &transform(node, &name)?);
-            if let Some(mesh) = integer(node, "mesh", &name)? {
-                self.read_mesh(mesh, &matrix, &format!("{name}.mesh"))?;
-            }
-            if self.soup.looks.is_some() {
-                self.read_light(node, &matrix, &name)?;
-                self.read_camera(node, &matrix, &name)?;
-            }
-            let children = self.list(node, "children", &name)?;
-            stack.extend(children.into_iter().rev().map(|child| (child, matrix, depth + 1)));
-        }
-        Ok(())
-    }
-
-    /// Indices under a key.
-    fn list(&self, json: &Value, key: &str, name: &str) -> Result<Vec<usize>> {
-        let index = |value: &Value| {
-            let found = value.as_u64().map(|x| x as usize);
-            found.ok_or_else(|| wrong(part(format!("{name}.{key}")), "integers, 0 or more", value))
-        };
-        array(json, key).iter().map(index).collect()
-    }
-
-    fn read_mesh(&mut self, index: usize, matrix: &Matrix, named_by: &str) -> Result<()> {
+    /// Adds the primitives of a mesh, moved by the matrix, or where they are.
+    fn read_mesh(&mut self, index: usize, matrix: Option<&Matrix>, named_by: &str) -> Result<()> {
         let mesh = entry(self.json, "meshes", index, named_by)?;
         for (i, primitive) in array(mesh, "primitives").iter().enumerate() {
             self.read_primitive(primitive, matrix, &format!("meshes[{index}].primitives[{i}]"))?;
@@ -246,7 +218,12 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn read_primitive(&mut self, primitive: &Value, matrix: &Matrix, name: &str) -> Result<()> {
+    fn read_primitive(
+        &mut self,
+        primitive: &Value,
+        matrix: Option<&Matrix>,
+        name: &str,
+    ) -> Result<()> {
         let mode = integer(primitive, "mode", name)?.unwrap_or(4);
         match mode {
             0..=3 => {
@@ -265,13 +242,13 @@ impl<'a> Reader<'a> {
         let points = self.accessor(positions, &["VEC3"], kinds, &format!("{name}.POSITION"))?;
         let place = || part(format!("accessors[{positions}]"));
         for point in points.values.as_chunks::<3>().0 {
-            let moved = matrix.map(|[x, y, z, t]| x * point[0] + y * point[1] + z * point[2] + t);
-            self.soup.vertex(place, moved, self.limits)?;
+            let point = matrix.map_or(*point, |matrix| moved(matrix, *point));
+            self.soup.vertex(place, point, self.limits)?;
         }
         let count = points.values.len() / 3;
         drop(points);
         if self.soup.looks.is_some() {
-            self.read_looks(primitive, matrix, count, name)?;
+            self.read_looks(primitive, matrix.unwrap_or(&IDENTITY), count, name)?;
         }
         let place = || part(format!("{name}.indices"));
         let indices: Option<Vec<f64>> = match integer(primitive, "indices", name)? {
@@ -293,8 +270,7 @@ impl<'a> Reader<'a> {
             return Err(wrong(place(), "three vertices a triangle", n));
         }
         let triangles = if mode == 4 { n / 3 } else { n.saturating_sub(2) };
-        // A mirrored mesh is turned inside out, which its faces make up for (glTF 2.0, section 3.7.4).
-        let is_mirrored = determinant(matrix) < 0.0;
+        let is_mirrored = matrix.is_some_and(is_mirrored);
         for i in 0..triangles {
             let [a, b, c] = match mode {
                 4 => [3 * i, 3 * i + 1, 3 * i + 2],
@@ -403,70 +379,6 @@ fn fetch(
     };
     // No longer than the text, which is within the limits.
     STANDARD.decode(text).map_err(|e| ("data in base64".into(), e.to_string()))
-}
-
-/// Rounded, after it is scaled to a length that `f32` holds.
-fn small(v: [f64; 3]) -> [f32; 3] {
-    let most = v.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-    if most > 0.0 && most.is_finite() { v.map(|x| (x / most) as f32) } else { [0.0; 3] }
-}
-
-/// The matrix that moves normals, up to a factor: of cofactors, with the sign of the determinant, since faces of mirrored
-/// meshes are turned.
-fn cofactors(m: &Matrix) -> [[f64; 3]; 3] {
-    let sign = if determinant(m) < 0.0 { -1.0 } else { 1.0 };
-    std::array::from_fn(|i| {
-        let (p, q) = (m[(i + 1) % 3], m[(i + 2) % 3]);
-        std::array::from_fn(|j| {
-            let (k, l) = ((j + 1) % 3, (j + 2) % 3);
-            sign * (p[k] * q[l] - p[l] * q[k])
-        })
-    })
-}
-
-fn determinant(m: &Matrix) -> f64 {
-    let [a, b, c] = m;
-    a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0])
-        + a[2] * (b[0] * c[1] - b[1] * c[0])
-}
-
-/// The transform of a node: its matrix, or translation times rotation times scale.
-fn transform(node: &Value, name: &str) -> Result<Matrix> {
-    let numbers = |key: &str, default: &[f64]| -> Result<Vec<f64>> {
-        let place = || part(format!("{name}.{key}"));
-        if node[key].is_null() {
-            return Ok(default.to_vec());
-        }
-        let values: Vec<f64> = array(node, key).iter().filter_map(Value::as_f64).collect();
-        if values.len() != default.len() {
-            return Err(wrong(place(), format!("{} numbers", default.len()), &node[key]));
-        }
-        Ok(values)
-    };
-    if !node["matrix"].is_null() {
-        let m = numbers("matrix", &[0.0; 16])?;
-        // Column by column.
-        return Ok([0, 1, 2].map(|i| [m[i], m[4 + i], m[8 + i], m[12 + i]]));
-    }
-    let (t, s) = (numbers("translation", &[0.0; 3])?, numbers("scale", &[1.0; 3])?);
-    let q = numbers("rotation", &[0.0, 0.0, 0.0, 1.0])?;
-    let [x, y, z, w] = [q[0], q[1], q[2], q[3]];
-    let r = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
-        [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
-        [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
-    ];
-    Ok([0, 1, 2].map(|i| [r[i][0] * s[0], r[i][1] * s[1], r[i][2] * s[2], t[i]]))
-}
-
-/// One transform behind another; `a` is done last.
-fn times(a: &Matrix, b: &Matrix) -> Matrix {
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| {
-            let last = if j == 3 { a[i][3] } else { 0.0 };
-            a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j] + last
-        })
-    })
 }
 
 /// `%20` and its like; what is none stays.

@@ -105,6 +105,7 @@ pub fn note_skipped(json: &Value, soup: &mut Soup) {
         soup.skip("scenes besides the default one");
     }
     let known = [
+        "EXT_mesh_gpu_instancing",
         "KHR_lights_punctual",
         "KHR_materials_emissive_strength",
         "KHR_materials_ior",
