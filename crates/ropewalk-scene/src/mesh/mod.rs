@@ -218,7 +218,7 @@ fn read_input(
         }
         MeshFormat::Stl => finished(stl::parse(input, soup, limits)?)?,
         MeshFormat::Off => finished(off::parse(input, soup, limits)?)?,
-        MeshFormat::Gltf => gltf::parse(&input.rest()?, soup, &beside, limits)?,
+        MeshFormat::Gltf => gltf::parse(input.rest()?, soup, &beside, limits)?,
     };
     if stage.materials.is_empty() {
         stage.materials.push(Material::default());

@@ -72,6 +72,15 @@ impl Soup {
         let _ = self.faces.try_reserve_exact(faces.min(limits.faces));
     }
 
+    /// Memory for so many more, as exact as it can be without moving what is there again and again.
+    pub fn expect(&mut self, vertices: usize, faces: usize, limits: &Watched<'_>) {
+        if self.vertices.is_empty() && self.faces.is_empty() {
+            return self.reserve(vertices, faces, limits);
+        }
+        let _ = self.vertices.try_reserve(vertices.min(limits.vertices));
+        let _ = self.faces.try_reserve(faces.min(limits.faces));
+    }
+
     /// Triangles so far.
     pub fn faces(&self) -> usize {
         self.faces.len()

@@ -3,7 +3,7 @@
 use super::super::error::{Result, wrong};
 use super::super::placed::{IDENTITY, Matrix, PlacedMeshes, Placement, moved};
 use super::super::{Mesh, Place};
-use super::accessor::Kinds;
+use super::accessor::{Accessor, Purpose};
 use super::matrix::{NO_ROTATION, composed, times, transform};
 use super::{Reader, array, entry, integer, part};
 use serde_json::Value;
@@ -123,26 +123,25 @@ impl Reader<'_> {
         }
         let name = format!("{name}.extensions.{key}");
         let mut count = None;
-        let mut rows = |key: &str, shape: &str, kinds: Kinds| -> Result<Option<Vec<f64>>> {
+        let mut named_rows = |key: &str, purpose: Purpose| -> Result<Option<Accessor<'_>>> {
             let Some(accessor) = integer(attributes, key, &name)? else { return Ok(None) };
-            let rows = self.accessor(accessor, &[shape], kinds, &format!("{name}.{key}"))?;
-            let found = rows.values.len() / rows.width;
-            let expected = *count.get_or_insert(found);
-            if found != expected {
+            let rows = self.accessor(accessor, purpose, &format!("{name}.{key}"))?;
+            let expected = *count.get_or_insert(rows.count);
+            if rows.count != expected {
                 let what = format!("{expected} of them, as of the attribute before");
-                return Err(wrong(part(format!("{name}.{key}")), what, found));
+                return Err(wrong(part(format!("{name}.{key}")), what, rows.count));
             }
-            Ok(Some(rows.values))
+            Ok(Some(rows))
         };
-        let translations = rows("TRANSLATION", "VEC3", Kinds::Float)?;
-        let rotations = rows("ROTATION", "VEC4", Kinds::Any)?;
-        let scales = rows("SCALE", "VEC3", Kinds::Float)?;
+        let translations = rows(named_rows("TRANSLATION", Purpose::Length)?)?;
+        let rotations = rows(named_rows("ROTATION", Purpose::Rotation)?)?;
+        let scales = rows(named_rows("SCALE", Purpose::Length)?)?;
         let Some(count) = count else {
             let what = "TRANSLATION, ROTATION or SCALE";
             return Err(wrong(part(format!("{name}.attributes")), what, "none"));
         };
-        fn row<const N: usize>(all: &Option<Vec<f64>>, i: usize, default: [f64; N]) -> [f64; N] {
-            all.as_ref().map_or(default, |all| all.as_chunks().0[i])
+        fn row<const N: usize>(all: &[[f64; N]], i: usize, default: [f64; N]) -> [f64; N] {
+            all.get(i).copied().unwrap_or(default)
         }
         for i in 0..count {
             let (t, s) = (row(&translations, i, [0.0; 3]), row(&scales, i, [1.0; 3]));
@@ -202,6 +201,18 @@ impl Reader<'_> {
             _ => Err(wrong(Place::End, "at least one face", "none")),
         }
     }
+}
+
+/// All rows, or none.
+fn rows<const N: usize>(accessor: Option<Accessor<'_>>) -> Result<Vec<[f64; N]>> {
+    let mut all = Vec::new();
+    if let Some(accessor) = accessor {
+        accessor.rows(|row| {
+            all.push(row);
+            Ok(())
+        })?;
+    }
+    Ok(all)
 }
 
 impl Kept {
