@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from . import _ropewalk
-from ._errors import ArgumentTypeError, SceneFileError
+from ._errors import ArgumentError, ArgumentTypeError, SceneFileError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -45,8 +45,26 @@ def as_path(path: str | os.PathLike[str]) -> str:
     return name
 
 
+def as_merge(merge: bool | float) -> float | None:
+    """Within which distance vertices are merged; None if they are not."""
+    if isinstance(merge, (bool, np.bool_)):
+        return 0.0 if merge else None
+    if not isinstance(merge, (int, float, np.integer, np.floating)):
+        raise ArgumentTypeError(
+            f"merge: expected True, False or a distance, found {type(merge).__name__}", "merge"
+        )
+    distance = float(merge)
+    if not 0 <= distance < np.inf:
+        raise ArgumentError(
+            f"merge: expected a distance that is finite and 0 or more, found {distance:g}", "merge"
+        )
+    return distance
+
+
 def read_mesh(
     path: str | os.PathLike[str],
+    *,
+    merge: bool | float = False,
 ) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
     """Vertices (V, 3) and triangles (F, 3) of a mesh file: OBJ, PLY (ascii or binary, both byte orders),
     STL (ascii or binary), OFF, or glTF 2.0 (.gltf with its buffers, .glb), also gzipped. Which of them it is
@@ -57,7 +75,14 @@ def read_mesh(
     corners: convex ones by diagonals from a corner, others by cutting off ears. STL has three
     vertices of its own for each triangle.
 
+    Args:
+        path: the file.
+        merge: True makes one of vertices at exactly the same place, a distance one of those within it: taken in their
+            order, each becomes the first one kept that lies no farther (Euclidean), or is kept as it is. Faces stay,
+            those that lose their area too.
+
     Raises:
+        ArgumentError, ArgumentTypeError: a bad ``merge``.
         SceneNotFoundError: the file cannot be opened.
         SceneFileError: its content is wrong; the message says in which line, at which byte or in which
             part, and what was expected. Vertices that are not finite, faces that name no vertex or have
@@ -71,7 +96,7 @@ def read_mesh(
     array([[0, 1, 2]], dtype=uint32)
     """
     name = as_path(path)
-    mesh = _ropewalk.read_mesh(name)
+    mesh = _ropewalk.read_mesh(name, as_merge(merge))
     if mesh is None:
         raise _not_a_mesh(name)
     return mesh

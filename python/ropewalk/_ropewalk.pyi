@@ -18,7 +18,9 @@ def open(
     faces: _U32 | None = None,
 ) -> Core | DoubleCore: ...
 
-def read_mesh(path: str) -> tuple[NDArray[np.float64], NDArray[np.uint32]] | None: ...
+def read_mesh(
+    path: str, merge: float | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.uint32]] | None: ...
 def read_instances(
     path: str,
 ) -> tuple[

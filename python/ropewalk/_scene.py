@@ -25,7 +25,7 @@ from ._arrays import (
 )
 from ._errors import ArgumentError, ArgumentTypeError, PrecisionWarning, SceneFileError
 from ._file import Saved
-from ._mesh import Instances, as_path
+from ._mesh import Instances, as_merge, as_path
 from ._points import PointMethods
 from ._rays import RayMethods, RaySample, as_sample
 from ._report import Report, plural, report_of, size_of
@@ -436,6 +436,7 @@ def load(
     progress: bool | Callable[[float], object] | None = None,
     memory_limit: int | None = None,
     instances: bool = False,
+    merge: bool | float = False,
 ) -> Scene:
     """Loads a scene: a mesh file as :func:`read_mesh` reads it (OBJ, PLY, STL, OFF, glTF), an NFF file,
     both gzipped or not, told apart by content, then by name, or a built-in scene, ``"spd:NAME"`` or
@@ -448,25 +449,28 @@ def load(
     With ``instances``, meshes of glTF that several nodes name are held once, in double precision, and placed:
     ``geom_id`` is the placement of :func:`read_instances`, ``prim_id`` the triangle within its mesh, as of
     :meth:`Scene.from_instances`. Memory and build time then go by the meshes, rays that meet many instances take
-    longer. ``rays`` and ``memory_limit`` are not known there.
+    longer. ``rays``, ``memory_limit`` and ``merge`` are not known there.
+
+    ``merge`` makes one of vertices as :func:`read_mesh` says; with True rays hit the same, and the scene takes less memory.
 
     Raises:
         SceneNotFoundError: the file cannot be opened.
         SceneFileError: its content is wrong; the message says where. With ``instances`` also for a node whose
             transform has no inverse.
-        ArgumentError: ``instances`` with an NFF file, a built-in scene, single precision, ``rays`` or
-            ``memory_limit``.
+        ArgumentError: ``instances`` or ``merge`` with an NFF file or a built-in scene; ``instances`` with single
+            precision, ``rays``, ``memory_limit`` or ``merge``.
 
     >>> import ropewalk
     >>> ropewalk.load("spd:balls:2")
     <ropewalk.Scene of 92 primitives in 1 mesh, box (-12, -12, -0.5) to (12, 12, 0.785072), tree 6.4 KiB>
     """
-    name = as_path(path)
+    name, distance = as_path(path), as_merge(merge)
     if instances:
         for argument, value, expected in (
             ("precision", precision, ("auto", "double")),
             ("rays", rays, (None,)),
             ("memory_limit", memory_limit, (None,)),
+            ("merge", distance, (None,)),
         ):
             if not any(value is x or (isinstance(value, str) and value == x) for x in expected):
                 what = " or ".join(map(repr, expected))
@@ -478,7 +482,7 @@ def load(
             )
         plan = _plan(preset, cost_model)
         return Scene._of_file(name, Instances(*found), plan, as_threads(threads), progress)
-    mesh = _ropewalk.read_mesh(name)
+    mesh = _ropewalk.read_mesh(name, distance)
     if mesh is not None:
         return Scene(
             *mesh,
@@ -489,6 +493,10 @@ def load(
             threads=threads,
             progress=progress,
             memory_limit=memory_limit,
+        )
+    if distance is not None:
+        raise ArgumentError(
+            f"merge: expected False for NFF files and built-in scenes, found {merge!r}", "merge"
         )
     if precision == "double":
         raise ArgumentError(

@@ -561,6 +561,21 @@ fn meshes_are_converted_whole_or_not_at_all() {
         text.contains("b.stl: 10 triangles, 584 bytes") && text.contains("lost: normals"),
         "{text}"
     );
+    // Triangles with vertices of their own, merged only if asked.
+    let merged = |args: &[&str]| -> Value {
+        let output = run(&[&["convert", "b.stl", "m.off", "--json"], args].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let json = merged(&[]);
+    assert_eq!((&json["vertices"], &json["merged"]), (&30.into(), &Value::Null));
+    let json = merged(&["--merge"]);
+    assert_eq!((&json["vertices"], &json["merged"]), (&8.into(), &22.into()));
+    assert_eq!(json["triangles"], 10);
+    let json = merged(&["--merge=0.15"]);
+    assert_eq!((&json["vertices"], &json["merged"]), (&7.into(), &23.into()));
+    let text = stderr(&run(&["convert", "--merge", "b.stl", "m.off"]));
+    assert!(text.contains("merged: 22 vertices, 8 are left"), "{text}");
     let before = files(folder.path());
     let refused = |args: &[&str], code: i32, part: &str| {
         let output = run(args);
@@ -569,6 +584,10 @@ fn meshes_are_converted_whole_or_not_at_all() {
     };
     std::fs::write(path("bad.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
     std::fs::write(path("s.nff"), "s 0 0 0 1\n").unwrap();
+    for distance in ["--merge=-1", "--merge=nan", "--merge=inf"] {
+        refused(&["convert", "a.obj", "c.off", distance], 2, "expected a distance that is finite");
+    }
+    refused(&["convert", "a.obj", "c.off", "--merge=x"], 2, "invalid");
     refused(&["convert", "a.obj", "./a.obj"], 2, "the input itself is not overwritten");
     refused(&["convert", "a.obj", "c.fbx"], 2, "expected a name that ends in .obj");
     refused(&["convert", "a.obj", "c.obj.gz"], 2, "expected a name that ends in .obj");

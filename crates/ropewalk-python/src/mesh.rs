@@ -1,6 +1,6 @@
 //! Mesh files as arrays.
 
-use crate::error::Failure;
+use crate::error::{Failure, argument};
 use crate::work;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -24,14 +24,26 @@ type Placed<'py> = (
     Bound<'py, PyArray1<i64>>,
 );
 
-/// The mesh in a file, told by its content, then by its name; None if it is a scene in NFF or a built-in one.
+/// The mesh in a file, told by its content, then by its name; None if it is a scene in NFF or a built-in one. Vertices within the
+/// distance `merge` are merged.
 #[pyfunction]
-pub fn read_mesh<'py>(py: Python<'py>, path: &str) -> PyResult<Option<Arrays<'py>>> {
+#[pyo3(signature = (path, merge=None))]
+pub fn read_mesh<'py>(
+    py: Python<'py>,
+    path: &str,
+    merge: Option<f64>,
+) -> PyResult<Option<Arrays<'py>>> {
     if is_scene(path)? {
         return Ok(None);
     }
     let load = |monitor: &work::Stop<'_>| load_monitored(path, &NffLimits::default(), monitor);
-    let Loaded::Mesh(_, mesh) = work::alone(py, load)?.map_err(failed)? else { return Ok(None) };
+    let Loaded::Mesh(_, mut mesh) = work::alone(py, load)?.map_err(failed)? else {
+        return Ok(None);
+    };
+    if let Some(distance) = merge {
+        work::alone(py, |monitor: &work::Stop<'_>| mesh.merge_vertices(distance, monitor))?
+            .map_err(|error| argument("merge", None, format!("merge: {error}")))?;
+    }
     arrays(py, mesh).map(Some)
 }
 

@@ -3,7 +3,8 @@
 //! [`Mesh`] reads positions and faces, [`PlacedMeshes`] keeps the meshes of nodes apart, [`Stage`] reads what a file says of looks
 //! too. Whatever a file announces is
 //! checked against its size before memory is taken for it, and every error says where it is and what was expected there.
-//! All but glTF is read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong.
+//! All but glTF is read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong,
+//! [`Mesh::merge_vertices`] makes one of vertices at one place, when asked to.
 
 mod beside;
 mod defects;
@@ -11,6 +12,7 @@ mod error;
 mod format;
 mod gltf;
 mod input;
+mod merge;
 mod mtl;
 mod obj;
 mod off;
@@ -29,6 +31,7 @@ pub use error::{MeshError, MeshErrorKind, Place};
 pub(crate) use format::{HEAD, recognise};
 pub use format::{MeshFormat, Recognised};
 pub(crate) use input::GZIP_MAGIC;
+pub use merge::MergeError;
 pub use placed::{PlacedMeshes, Placement};
 pub use write::MeshOutput;
 
