@@ -206,8 +206,11 @@ fn texture(
     };
     let texture = entry(json, "textures", index, "textureInfo.index")?;
     let name = format!("textures[{index}]");
-    let Some(image) = integer(texture, "source", &name)? else {
-        skipped.note(format!("{name}: expected a PNG or JPEG source, found none"));
+    let webp = integer(&texture["extensions"]["EXT_texture_webp"], "source", &name)?;
+    let Some(image) =
+        webp.map_or_else(|| integer(texture, "source", &name), |webp| Ok(Some(webp)))?
+    else {
+        skipped.note(format!("{name}: expected a PNG, JPEG or WebP source, found none"));
         return Ok(None);
     };
     let picture = entry(json, "images", image, &format!("{name}.source"))?;

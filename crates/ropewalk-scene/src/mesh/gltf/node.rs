@@ -106,6 +106,7 @@ pub fn note_skipped(json: &Value, soup: &mut Soup) {
     }
     let known = [
         "EXT_mesh_gpu_instancing",
+        "EXT_texture_webp",
         "KHR_lights_punctual",
         "KHR_materials_emissive_strength",
         "KHR_materials_ior",
