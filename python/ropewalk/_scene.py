@@ -295,7 +295,7 @@ class Scene(Saved, RayMethods, PointMethods):
         all_scenes = [scenes[i] for i in found.mesh.tolist()]
         cores, masks = [scene._core for scene in all_scenes], [_ALL_BITS] * len(all_scenes)
         try:
-            core = DoubleCore.place(cores, found.matrices.reshape(-1), masks, threads)  # type: ignore[arg-type]
+            core = DoubleCore.place(cores, found.matrices.reshape(-1), masks, threads)
         except ArgumentError as error:
             if error.index is None:
                 raise SceneFileError(f"{name}: {error}; instances=False may read it", "path") from None
