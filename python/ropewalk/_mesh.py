@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _ropewalk
 from ._errors import ArgumentError, ArgumentTypeError, SceneFileError
+from ._report import plural
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,6 +32,10 @@ class Instances(NamedTuple):
     matrices: NDArray[np.float64]
     names: list[str]
     nodes: NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        placements = plural(len(self.mesh), "placement", "placements")
+        return f"<ropewalk.Instances: {placements} of {plural(len(self.meshes), 'mesh', 'meshes')}>"
 
 
 def as_path(path: str | os.PathLike[str]) -> str:
@@ -117,8 +122,10 @@ def read_instances(path: str | os.PathLike[str]) -> Instances:
     >>> path = pathlib.Path(tempfile.mkdtemp(), "one.obj")
     >>> _ = path.write_text("v 0 0 0\\nv 1 0 0\\nv 0 1 0\\nf 1 2 3\\n")
     >>> found = ropewalk.read_instances(path)
-    >>> len(found.meshes), found.mesh, found.matrices.shape
-    (1, array([0], dtype=int32), (1, 3, 4))
+    >>> found
+    <ropewalk.Instances: 1 placement of 1 mesh>
+    >>> found.mesh, found.matrices.shape
+    (array([0], dtype=int32), (1, 3, 4))
     """
     name = as_path(path)
     found = _ropewalk.read_instances(name)
