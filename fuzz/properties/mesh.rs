@@ -1,6 +1,6 @@
 //! What must hold of the mesh readers for any bytes. Shared by the fuzz target and by the ordinary tests.
 
-use ropewalk_scene::{Mesh, MeshFormat, MeshLimits, MeshOutput, Stage, stage};
+use ropewalk_scene::{Mesh, MeshFormat, MeshLimits, MeshOutput, PlacedMeshes, Stage, stage};
 use std::path::Path;
 
 /// Small, so that a short input reaches each of them.
@@ -9,6 +9,7 @@ const LIMITS: MeshLimits = MeshLimits {
     vertices: 10_000,
     faces: 10_000,
     corners: 500,
+    placements: 1_000,
     images: 10,
     pixels: 10_000,
 };
@@ -30,6 +31,7 @@ pub fn reads_or_refuses(format: MeshFormat, bytes: &[u8], folder: Option<&Path>)
             let sentence = error.to_string();
             assert!(!sentence.contains(char::is_control), "{sentence:?}");
             assert!(dressed.is_err(), "only the mesh is refused: {sentence}");
+            check_placed(format, bytes, folder, Err(sentence));
             return false;
         }
     };
@@ -37,6 +39,7 @@ pub fn reads_or_refuses(format: MeshFormat, bytes: &[u8], folder: Option<&Path>)
     assert!(mesh.vertices.len() <= LIMITS.vertices);
     assert!(mesh.faces.iter().flatten().all(|&i| (i as usize) < mesh.vertices.len()));
     assert!(mesh.vertices.iter().flatten().all(|&x| (x as f32).is_finite()));
+    check_placed(format, bytes, folder, Ok(&mesh));
     check_writers(&mesh);
     assert!(mesh.defects(&()).is_some());
     match dressed {
@@ -63,6 +66,41 @@ pub fn reads_or_refuses_with_library(bytes: &[u8], folder: &Path) -> bool {
         std::fs::write(folder.join(name), bytes).expect("the folder is written to");
     }
     reads_or_refuses(MeshFormat::Obj, obj, Some(folder))
+}
+
+/// Meshes that are kept apart are sound and come to the mesh of all. Only for what all come to may the file be refused and they
+/// not be.
+fn check_placed(
+    format: MeshFormat,
+    bytes: &[u8],
+    folder: Option<&Path>,
+    flat: Result<&Mesh, String>,
+) {
+    let placed = match (PlacedMeshes::parse(format, bytes, folder, &LIMITS), &flat) {
+        (Ok(placed), _) => placed,
+        (Err(_), Err(_)) => return,
+        (Err(error), Ok(_)) => panic!("only the placed meshes are refused: {error}"),
+    };
+    assert!(!placed.placements.is_empty() && placed.placements.len() <= LIMITS.placements);
+    let (mut vertices, mut faces) = (0, 0);
+    for mesh in &placed.meshes {
+        assert!(!mesh.faces.is_empty());
+        assert!(mesh.faces.iter().flatten().all(|&i| (i as usize) < mesh.vertices.len()));
+        assert!(mesh.vertices.iter().flatten().all(|&x| (x as f32).is_finite()));
+        (vertices, faces) = (vertices + mesh.vertices.len(), faces + mesh.faces.len());
+    }
+    assert!(vertices <= LIMITS.vertices && faces <= LIMITS.faces);
+    match flat {
+        Err(sentence) => assert!(sentence.contains("at most"), "only all of them: {sentence}"),
+        Ok(mesh) => {
+            let corners = |mesh: &Mesh| -> Vec<[[u64; 3]; 3]> {
+                let corner = |&i: &u32| mesh.vertices[i as usize].map(f64::to_bits);
+                mesh.faces.iter().map(|face| face.each_ref().map(corner)).collect()
+            };
+            assert_eq!(placed.faces(), mesh.faces.len());
+            assert!(corners(&placed.flatten()) == corners(mesh), "they come to another mesh");
+        }
+    }
 }
 
 /// What is written of a mesh is read back.

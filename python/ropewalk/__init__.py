@@ -31,7 +31,7 @@ from ._errors import (
     SceneWriteError,
 )
 from ._hits import HitLists, Hits
-from ._mesh import read_mesh
+from ._mesh import Instances, read_instances, read_mesh
 from ._points import Cells, ClosestPoints
 from ._report import Report
 from ._ropewalk import default_threads, simd_level
@@ -51,6 +51,7 @@ __all__ = [
     "Events",
     "HitLists",
     "Hits",
+    "Instances",
     "InternalError",
     "InvalidPointError",
     "InvalidPointWarning",
@@ -70,6 +71,7 @@ __all__ = [
     "Walker",
     "default_threads",
     "load",
+    "read_instances",
     "read_mesh",
     "simd_level",
 ]

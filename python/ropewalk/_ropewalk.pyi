@@ -18,7 +18,18 @@ def open(
     faces: _U32 | None = None,
 ) -> Core | DoubleCore: ...
 
-def read_mesh(path: str) -> tuple[NDArray[np.float64], NDArray[np.uint32]] | None: ...
+def read_mesh(
+    path: str, merge: float | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.uint32]] | None: ...
+def read_instances(
+    path: str,
+) -> tuple[
+    list[tuple[NDArray[np.float64], NDArray[np.uint32]]],
+    NDArray[np.int32],
+    NDArray[np.float64],
+    list[str],
+    NDArray[np.int64],
+] | None: ...
 
 _F32 = NDArray[np.float32]
 _F64 = NDArray[np.float64]

@@ -23,9 +23,9 @@ from ._arrays import (
     as_threads,
     moved,
 )
-from ._errors import ArgumentError, ArgumentTypeError, PrecisionWarning
+from ._errors import ArgumentError, ArgumentTypeError, PrecisionWarning, SceneFileError
 from ._file import Saved
-from ._mesh import as_path
+from ._mesh import Instances, as_merge, as_path
 from ._points import PointMethods
 from ._rays import RayMethods, RaySample, as_sample
 from ._report import Report, plural, report_of, size_of
@@ -271,6 +271,44 @@ class Scene(Saved, RayMethods, PointMethods):
         placed._placed = scenes, matrices
         return placed
 
+    @classmethod
+    def _of_file(
+        cls,
+        name: str,
+        found: Instances,
+        plan: tuple[str, str],
+        threads: int,
+        progress: bool | Callable[[float], object] | None,
+    ) -> Scene:
+        """Builds each mesh once, and places them."""
+        scenes, done = [], 0
+        total = sum(len(faces) for _, faces in found.meshes)
+        with _progress(progress) as show:
+            for vertices, faces in found.meshes:
+                starts, masks = [0, len(faces)], [_ALL_BITS]
+                share = None if show is None else _share(show, done / total, len(faces) / total)
+                scene = cls.__new__(cls)
+                scene._adopt(DoubleCore.build(vertices, faces, starts, masks, plan, threads, share))
+                scenes.append(scene)
+                done += len(faces)
+        placed = cls.__new__(cls)
+        all_scenes = [scenes[i] for i in found.mesh.tolist()]
+        cores, masks = [scene._core for scene in all_scenes], [_ALL_BITS] * len(all_scenes)
+        try:
+            core = DoubleCore.place(cores, found.matrices.reshape(-1), masks, threads)
+        except ArgumentError as error:
+            if error.index is None:
+                raise SceneFileError(f"{name}: {error}; instances=False may read it", "path") from None
+            why = str(error).removeprefix(f"instances[{error.index}]: ")
+            node, called = found.nodes[error.index], found.names[error.index]
+            where = f"nodes[{node}]" + (f" ({called})" if called else "") if node >= 0 else "the mesh"
+            raise SceneFileError(
+                f"{name}: {where}: {why}; instances=False works such nodes into the vertices", "path"
+            ) from None
+        placed._adopt(core)
+        placed._placed = all_scenes, found.matrices
+        return placed
+
     def _adopt(self, core: Core | DoubleCore) -> None:
         self._core = core
         self._points = None
@@ -397,6 +435,8 @@ def load(
     threads: int = 0,
     progress: bool | Callable[[float], object] | None = None,
     memory_limit: int | None = None,
+    instances: bool = False,
+    merge: bool | float = False,
 ) -> Scene:
     """Loads a scene: a mesh file as :func:`read_mesh` reads it (OBJ, PLY, STL, OFF, glTF), an NFF file,
     both gzipped or not, told apart by content, then by name, or a built-in scene, ``"spd:NAME"`` or
@@ -406,16 +446,43 @@ def load(
     spheres, cones and patches of NFF stay what they are, and are always of single precision. The other
     arguments are those of :class:`Scene`.
 
+    With ``instances``, meshes of glTF that several nodes name are held once, in double precision, and placed:
+    ``geom_id`` is the placement of :func:`read_instances`, ``prim_id`` the triangle within its mesh, as of
+    :meth:`Scene.from_instances`. Memory and build time then go by the meshes, rays that meet many instances take
+    longer. ``rays``, ``memory_limit`` and ``merge`` are not known there.
+
+    ``merge`` makes one of vertices as :func:`read_mesh` says; with True rays hit the same, and the scene takes less memory.
+
     Raises:
         SceneNotFoundError: the file cannot be opened.
-        SceneFileError: its content is wrong; the message says where.
+        SceneFileError: its content is wrong; the message says where. With ``instances`` also for a node whose
+            transform has no inverse.
+        ArgumentError: ``instances`` or ``merge`` with an NFF file or a built-in scene; ``instances`` with single
+            precision, ``rays``, ``memory_limit`` or ``merge``.
 
     >>> import ropewalk
     >>> ropewalk.load("spd:balls:2")
     <ropewalk.Scene of 92 primitives in 1 mesh, box (-12, -12, -0.5) to (12, 12, 0.785072), tree 6.4 KiB>
     """
-    name = as_path(path)
-    mesh = _ropewalk.read_mesh(name)
+    name, distance = as_path(path), as_merge(merge)
+    if instances:
+        for argument, value, expected in (
+            ("precision", precision, ("auto", "double")),
+            ("rays", rays, (None,)),
+            ("memory_limit", memory_limit, (None,)),
+            ("merge", distance, (None,)),
+        ):
+            if not any(value is x or (isinstance(value, str) and value == x) for x in expected):
+                what = " or ".join(map(repr, expected))
+                raise ArgumentError(f"{argument}: expected {what} with instances=True", argument)
+        found = _ropewalk.read_instances(name)
+        if found is None:
+            raise ArgumentError(
+                "instances: expected False for NFF files and built-in scenes, found True", "instances"
+            )
+        plan = _plan(preset, cost_model)
+        return Scene._of_file(name, Instances(*found), plan, as_threads(threads), progress)
+    mesh = _ropewalk.read_mesh(name, distance)
     if mesh is not None:
         return Scene(
             *mesh,
@@ -426,6 +493,10 @@ def load(
             threads=threads,
             progress=progress,
             memory_limit=memory_limit,
+        )
+    if distance is not None:
+        raise ArgumentError(
+            f"merge: expected False for NFF files and built-in scenes, found {merge!r}", "merge"
         )
     if precision == "double":
         raise ArgumentError(
@@ -609,6 +680,11 @@ def _matrix(matrix: ArrayLike | None, name: str, index: int) -> np.ndarray:
             index,
         )
     return array[:3]
+
+
+def _share(show: Callable[[float], object], done: float, part: float) -> Callable[[float], object]:
+    """Progress of one of several builds."""
+    return lambda share: show(done + part * share)
 
 
 @contextmanager

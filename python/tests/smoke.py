@@ -135,6 +135,8 @@ def calls():
         rows += ["3 " + " ".join(map(str, f)) for f in faces.tolist()]
         pathlib.Path(text).write_text("\n".join(rows))
         assert (ropewalk.read_mesh(text)[1] == faces).all()
+        assert len(ropewalk.read_instances(text).meshes) == 1 and len(ropewalk.load(text, instances=True)) == len(faces)
+        assert len(ropewalk.read_mesh(text, merge=True)[0]) <= len(vertices)
         opened = ropewalk.Scene.open(saved, verify=True, vertices=vertices, faces=faces)
         others = [opened, ropewalk.load(text), pickle.loads(pickle.dumps(scene)), copy.copy(scene)]
         results = [None] * 4

@@ -148,3 +148,26 @@ def test_far_from_the_origin(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert ropewalk.read_mesh(path)[0][0, 0] == 10000000.1
+
+
+def test_vertices_are_merged_when_asked(tmp_path):
+    path = tmp_path / "a.stl"
+    path.write_bytes(stl())
+    apart, faces = ropewalk.read_mesh(path)
+    assert apart.shape == (12, 3)
+    for merge, count in ((True, 4), (np.True_, 4), (0, 4), (0.6, 3), (np.float32(9), 1), (False, 12)):
+        vertices, merged = ropewalk.read_mesh(path, merge=merge)
+        assert (len(vertices), len(merged)) == (count, 4), merge
+        assert np.abs(vertices[merged] - apart[faces]).max() <= (0 if count > 3 else 1)
+    scene, other = ropewalk.load(path, merge=True), ropewalk.load(path)
+    rays = [[0.1, 0.1, 5], [0.1, 0.1, -5]], [[0, 0, -1], [0, 0, 1]]
+    assert scene.closest_hit(*rays).prim_id.tolist() == other.closest_hit(*rays).prim_id.tolist() == [3, 0]
+    for bad, error in ((-1, ropewalk.ArgumentError), (np.nan, ropewalk.ArgumentError), (np.inf, ropewalk.ArgumentError),
+                       ("x", ropewalk.ArgumentTypeError), (None, ropewalk.ArgumentTypeError)):
+        for read in (ropewalk.read_mesh, ropewalk.load):
+            with pytest.raises(error, match="^merge: expected") as caught:
+                read(path, merge=bad)
+            assert caught.value.argument == "merge"
+    for options in ({}, {"instances": True}):
+        with pytest.raises(ropewalk.ArgumentError, match="^merge: expected"):
+            ropewalk.load("spd:balls:1", merge=True, **options)

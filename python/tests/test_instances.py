@@ -1,6 +1,8 @@
 """Instances against the same triangles in a scene of their own."""
 
+import json
 import pickle
+import struct
 
 import numpy as np
 import pytest
@@ -122,3 +124,116 @@ def test_bad_instances():
             make(instances)
     with pytest.raises(ropewalk.ArgumentError, match="2 masks, one an instance"):
         make([(triangle, None)] * 2, masks=[1])
+
+
+def write_glb(path, meshes, nodes, **rest):
+    """Meshes of arrays (vertices, faces), each placed by the nodes."""
+    data, views, accessors, described = b"", [], [], []
+    for vertices, faces in meshes:
+        for array, kind, shape in ((np.float32(vertices), 5126, "VEC3"), (np.uint32(faces).ravel(), 5125, "SCALAR")):
+            views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
+            accessors.append(
+                {"bufferView": len(views) - 1, "componentType": kind, "count": len(array), "type": shape}
+            )
+            data += array.tobytes()
+        last = len(accessors) - 1
+        described.append({"primitives": [{"attributes": {"POSITION": last - 1}, "indices": last}]})
+    document = {
+        "asset": {"version": "2.0"},
+        "nodes": nodes,
+        "meshes": described,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
+        **rest,
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(
+        struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(data))
+        + struct.pack("<I4s", len(text), b"JSON") + text
+        + struct.pack("<I4s", len(data), b"BIN\0") + data
+    )
+    return path
+
+
+def file_of_instances(folder):
+    """Two meshes placed eleven times, two of them below another node, and half of them mirrored."""
+    rng, meshes = objects(5)
+    nodes = [
+        {"mesh": i % 2, "name": f"part {i}", "matrix": matrix.T.ravel().tolist()}
+        for i, matrix in enumerate(matrices(rng, 9))
+    ]
+    nodes += [{"mesh": 0}, {"mesh": 1, "scale": [1, 2, 1]}]
+    nodes.append({"children": [9, 10], "translation": [0.5, 0, 0.25]})
+    scenes = [{"nodes": [*range(9), 11]}]
+    return write_glb(folder / "parts.glb", meshes, nodes, scenes=scenes, scene=0), rng
+
+
+def test_files_as_instances(tmp_path):
+    path, rng = file_of_instances(tmp_path)
+    found = ropewalk.read_instances(path)
+    assert [len(faces) for _, faces in found.meshes] == [40, 7]
+    assert found.mesh.tolist() == [i % 2 for i in range(9)] + [0, 1]
+    assert found.names == [f"part {i}" for i in range(9)] + ["", ""]
+    assert found.nodes.tolist() == list(range(11)) and found.matrices.shape == (11, 3, 4)
+    scene = ropewalk.load(path, instances=True)
+    assert scene.precision == "double" and scene.mesh_sizes.tolist() == [40, 7] * 4 + [40, 40, 7]
+    flat = ropewalk.load(path, precision="double")
+    assert len(flat) == len(scene)
+    starts = np.concatenate([[0], np.cumsum(scene.mesh_sizes)])[:-1]
+    origins = rng.uniform(-3, 3, (20_000, 3))
+    directions = rng.uniform(-1, 1, (20_000, 3)) - origins
+    for faces in ("both", "front", "back"):
+        a = scene.closest_hit(origins, directions, faces=faces)
+        b = flat.closest_hit(origins, directions, faces=faces)
+        assert a.hit.mean() > 0.1
+        np.testing.assert_array_equal(np.where(a.hit, starts[a.geom_id] + a.prim_id, -1), b.prim_id)
+        np.testing.assert_allclose(a.t, b.t, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(a.normal, b.normal, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(
+        scene.count_hits(origins, directions), flat.count_hits(origins, directions)
+    )
+    again = pickle.loads(pickle.dumps(scene))
+    np.testing.assert_array_equal(again.closest_hit(origins, directions).t, scene.closest_hit(origins, directions).t)
+    shares = []
+    ropewalk.load(path, instances=True, preset="fast", threads=1, progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert 40 / 47 in shares, "the first of two meshes"
+
+
+def test_files_of_one_mesh_as_instances(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    found = ropewalk.read_instances(path)
+    assert found.names == [""] and found.nodes.tolist() == [-1]
+    np.testing.assert_array_equal(found.matrices, [np.eye(3, 4)])
+    assert ropewalk.load(path, instances=True).closest_hit([0.2, 0.2, 1], [0, 0, -1]).t == 1
+
+
+def test_bad_files_of_instances(tmp_path):
+    _, meshes = objects()
+    flat = write_glb(tmp_path / "flat.glb", meshes, [{"mesh": 0}, {"mesh": 1, "name": "shadow", "scale": [1, 1, 0]}])
+    with pytest.raises(ropewalk.SceneFileError, match=r"flat\.glb: nodes\[1\] \(shadow\): matrix: .* inverse, .*; instances=False"):
+        ropewalk.load(flat, instances=True)
+    assert len(ropewalk.load(flat)) == 47
+    twice = write_glb(tmp_path / "twice.glb", meshes, [{"mesh": 0}, {"children": [0]}, {"children": [0]}])
+    for read in (ropewalk.read_instances, lambda path: ropewalk.load(path, instances=True)):
+        with pytest.raises(ropewalk.SceneFileError, match=r"twice\.glb: nodes\[0\]: expected a node with one parent"):
+            read(twice)
+        with pytest.raises(ropewalk.SceneNotFoundError, match="no such file"):
+            read(tmp_path / "absent.glb")
+        with pytest.raises(ropewalk.ArgumentTypeError, match="path"):
+            read(3.5)
+    with pytest.raises(ropewalk.SceneFileError, match="found a scene, which ropewalk.load reads"):
+        ropewalk.read_instances("spd:balls:1")
+    for name, value, path in (
+        ("instances", True, "spd:balls:1"),
+        ("precision", "single", flat),
+        ("memory_limit", 1 << 30, flat),
+        ("rays", (np.zeros((1, 3)), np.ones((1, 3))), flat),
+        ("preset", "none", flat),
+    ):
+        with pytest.raises(ropewalk.ArgumentError, match=name) as caught:
+            ropewalk.load(path, **{"instances": True, name: value})
+        assert caught.value.argument == name

@@ -472,6 +472,13 @@ fn mesh_files_are_rendered_and_timed() {
 const BOX: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 0.1\nv 9 9 9\n\
     vn 0 0 1\nusemtl paint\nf 1//1 3 4 2\nf 1 2 6 5\nf 3 7 8 4\nusemtl other\nf 1 5 7 3\nf 2 4 8 6\n";
 
+/// A triangle in glTF that three nodes place.
+const PLACED: &str = r#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],
+    "nodes":[{"mesh":0},{"mesh":0,"translation":[2,0,0],"children":[2]},{"mesh":0,"translation":[2,0,0]}],
+    "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],
+    "bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36,
+    "uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+
 #[test]
 fn meshes_are_explained() {
     let folder = tempfile::tempdir().unwrap();
@@ -508,6 +515,14 @@ fn meshes_are_explained() {
     ] {
         assert!(text.contains(part), "{text}");
     }
+    assert!(!text.contains("placed"), "one mesh where it is: {text}");
+    std::fs::write(folder.path().join("b.gltf"), PLACED).unwrap();
+    let json: Value = serde_json::from_str(&run(&["info", "b.gltf", "--json"])).unwrap();
+    assert_eq!((&json["meshes"], &json["placements"]), (&1.into(), &3.into()));
+    assert_eq!((&json["vertices"], &json["triangles"]), (&9.into(), &3.into()));
+    let text = run(&["info", "b.gltf"]);
+    let line = |what: &str| text.lines().find(|line| line.trim_start().starts_with(what)).unwrap();
+    assert!(line("meshes").ends_with(" 1") && line("placed").ends_with(" 3"), "{text}");
     let scene: Value = serde_json::from_str(&run(&["info", "spd:balls:1", "--json"])).unwrap();
     assert_eq!((&scene["kind"], &scene["spheres"]), (&"scene".into(), &10.into()));
     std::fs::write(folder.path().join("x"), "Dear reader").unwrap();
@@ -548,6 +563,21 @@ fn meshes_are_converted_whole_or_not_at_all() {
         text.contains("b.stl: 10 triangles, 584 bytes") && text.contains("lost: normals"),
         "{text}"
     );
+    // Triangles with vertices of their own, merged only if asked.
+    let merged = |args: &[&str]| -> Value {
+        let output = run(&[&["convert", "b.stl", "m.off", "--json"], args].concat());
+        assert!(output.status.success(), "{}", stderr(&output));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let json = merged(&[]);
+    assert_eq!((&json["vertices"], &json["merged"]), (&30.into(), &Value::Null));
+    let json = merged(&["--merge"]);
+    assert_eq!((&json["vertices"], &json["merged"]), (&8.into(), &22.into()));
+    assert_eq!(json["triangles"], 10);
+    let json = merged(&["--merge=0.15"]);
+    assert_eq!((&json["vertices"], &json["merged"]), (&7.into(), &23.into()));
+    let text = stderr(&run(&["convert", "--merge", "b.stl", "m.off"]));
+    assert!(text.contains("merged: 22 vertices, 8 are left"), "{text}");
     let before = files(folder.path());
     let refused = |args: &[&str], code: i32, part: &str| {
         let output = run(args);
@@ -556,6 +586,10 @@ fn meshes_are_converted_whole_or_not_at_all() {
     };
     std::fs::write(path("bad.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
     std::fs::write(path("s.nff"), "s 0 0 0 1\n").unwrap();
+    for distance in ["--merge=-1", "--merge=nan", "--merge=inf"] {
+        refused(&["convert", "a.obj", "c.off", distance], 2, "expected a distance that is finite");
+    }
+    refused(&["convert", "a.obj", "c.off", "--merge=x"], 2, "invalid");
     refused(&["convert", "a.obj", "./a.obj"], 2, "the input itself is not overwritten");
     refused(&["convert", "a.obj", "c.fbx"], 2, "expected a name that ends in .obj");
     refused(&["convert", "a.obj", "c.obj.gz"], 2, "expected a name that ends in .obj");

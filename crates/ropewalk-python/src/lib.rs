@@ -38,7 +38,7 @@ mod _ropewalk {
     #[pymodule_export]
     use crate::file::{open, save};
     #[pymodule_export]
-    use crate::mesh::read_mesh;
+    use crate::mesh::{read_instances, read_mesh};
     #[pymodule_export]
     use crate::points::Points;
     #[pymodule_export]

@@ -19,7 +19,10 @@ pub mod stage;
 mod watched;
 
 pub use file::write_atomically;
-pub use mesh::{Defects, Mesh, MeshError, MeshFormat, MeshLimits, MeshOutput, Recognised};
+pub use mesh::{
+    Defects, MergeError, Mesh, MeshError, MeshFormat, MeshLimits, MeshOutput, PlacedMeshes,
+    Placement, Recognised,
+};
 pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, SceneSink, Surface};
 pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};
 pub use nff::{format_g, read_nff};

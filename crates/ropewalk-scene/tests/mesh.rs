@@ -460,8 +460,15 @@ fn buffers_beside_the_file_and_nowhere_else() {
 
 #[test]
 fn limits_hold() {
-    let small =
-        MeshLimits { bytes: 10_000, vertices: 3, faces: 3, corners: 4, images: 2, pixels: 100 };
+    let small = MeshLimits {
+        bytes: 10_000,
+        vertices: 3,
+        faces: 3,
+        corners: 4,
+        placements: 2,
+        images: 2,
+        pixels: 100,
+    };
     let refused = |text: &str, limits: MeshLimits| {
         Mesh::parse(MeshFormat::Obj, text.as_bytes(), None, &limits).unwrap_err().to_string()
     };

@@ -213,7 +213,7 @@ fn textures_lie_in_the_folder_and_nowhere_else() {
         assert!(texture("up").skipped[0].contains("a link to elsewhere"));
     }
     assert!(texture("absent.png").skipped[0].contains("there is no such file"));
-    assert!(texture("a.mtl").skipped[0].contains("expected a PNG or JPEG image"));
+    assert!(texture("a.mtl").skipped[0].contains("expected a PNG, JPEG or WebP image"));
     std::fs::write(inner.join("a.obj"), format!("mtllib ../a.mtl b.mtl\n{FLAT}f 1 2 3\n")).unwrap();
     let skipped = read(&inner, "a.obj").unwrap().skipped;
     assert!(skipped[0].starts_with("material libraries, expected a file in this"), "{skipped:?}");
@@ -432,6 +432,72 @@ fn materials_of_gltf() {
     );
 }
 
+/// Four pixels by two, (200, 100, 50) with the first one half transparent: lossy with an alpha chunk, lossless, an animation.
+const WEBP: [&str; 3] = [
+    "UklGRl4AAABXRUJQVlA4WAoAAAAQAAAAAwAAAQAAQUxQSAkAAAAAgP////////8AVlA4IC4AAADwAQCdASoEAAIAAUAmJaACdLoB+AAEyAAA/q4X/zYEDND6YP/SbPE2eJs+OYAA",
+    "UklGRiIAAABXRUJQVlA4TBUAAAAvA0AAEA8wZIM8Mv8DjAfc4SGi/yEA",
+    "UklGRr4AAABXRUJQVlA4WAoAAAASAAAAAwAAAQAAQU5JTQYAAAAAAAAAAABBTk1GWgAAAAAAAAAAAAMAAAEAAGQAAAJBTFBICQAAAACA/////////wBWUDggMAAAADABAJ0BKgQAAgABQCYloAADcAD+xO///zYH/kH/yD7/f//pNn/9Js//pNnxzAAAAEFOTUYwAAAAAAAAAAAAAwAAAQAAZAAAAFZQOCAYAAAANAEAnQEqBAACAAAAJiWkAANwAP79IFAA",
+];
+
+#[test]
+fn webp_textures_of_gltf() {
+    use base64::{Engine, engine::general_purpose::STANDARD};
+    let with = |image: &[u8], texture: &str, limits: &MeshLimits| {
+        let rest = format!(
+            r#","extensionsUsed":["EXT_texture_webp"],"images":[{{"uri":"absent.png"}},{{"uri":"data:image/webp;base64,{}"}}],
+            "textures":[{texture}],"materials":[{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":0}}}}}}]"#,
+            STANDARD.encode(image)
+        );
+        let bytes = dressed_bytes(&rest, r#","material":0"#);
+        Stage::parse(MeshFormat::Gltf, &bytes, None, limits).unwrap()
+    };
+    let extension = r#"{"source":0,"extensions":{"EXT_texture_webp":{"source":1}}}"#;
+    let [lossy, lossless, animated] = WEBP.map(|text| STANDARD.decode(text).unwrap());
+    for image in [&lossy, &lossless] {
+        // Instead of the source, which is for those who know no WebP, or as the source.
+        for texture in [extension, r#"{"source":1}"#] {
+            let stage = with(image, texture, &LIMITS);
+            assert_eq!(stage.skipped, [""; 0]);
+            let [Image { width: 4, height: 2, pixels }] = &stage.images[..] else {
+                panic!("{:?}", stage.images)
+            };
+            assert_eq!((pixels[0][3], pixels[1][3]), (128, 255));
+            let far = |pixel: &[u8; 4]| {
+                (0..3).map(|i| pixel[i].abs_diff([200, 100, 50][i])).max().unwrap()
+            };
+            let most = pixels.iter().map(far).max().unwrap();
+            assert!(most <= if image == &lossless { 0 } else { 12 }, "{pixels:?}");
+        }
+    }
+    let refused = |image: &[u8], limits: &MeshLimits, what: &str| {
+        let stage = with(image, extension, limits);
+        assert_eq!((stage.images.len(), stage.materials[0].base_color_texture), (0, None));
+        assert!(stage.skipped[0].contains(what), "{:?}\n{what}", stage.skipped);
+    };
+    let few = of_pixels(7);
+    refused(&lossy, &few, "expected an image of 1 to 7 pixels, found 4 x 2: images[1]");
+    refused(&lossless, &few, "expected an image of 1 to 7 pixels, found 4 x 2");
+    refused(&lossless[..30], &LIMITS, "expected a sound image");
+    refused(&animated, &LIMITS, "expected one image, found an animation");
+    // A picture that is larger than its container says, for which the decoder would take memory first.
+    let at = lossy.windows(3).position(|bytes| bytes == [0x9d, 0x01, 0x2a]).unwrap() + 3;
+    let mut large = lossy.clone();
+    large[at..at + 4].copy_from_slice(&[0xff, 0x3f, 0xff, 0x3f]);
+    let what = "expected an image of 4 x 2, as its container says, found 16383 x 16383";
+    refused(&large, &of_pixels(8), what);
+    let mut large = lossy[..30].to_vec();
+    large[16..20].copy_from_slice(&10u32.to_le_bytes());
+    large.extend(&lossless[12..]);
+    let at = large.windows(5).position(|bytes| bytes[0] == 0x2f && bytes[1] == 3).unwrap() + 1;
+    large[at..at + 4].copy_from_slice(&[0xff, 0xff, 0xff, 0x0f]);
+    refused(&large, &of_pixels(8), "as its container says, found 16384 x 16384");
+}
+
+/// So many pixels and no more.
+fn of_pixels(pixels: u64) -> MeshLimits {
+    MeshLimits { pixels, ..LIMITS }
+}
+
 #[test]
 fn textures_of_gltf() {
     use base64::{Engine, engine::general_purpose::STANDARD};
@@ -455,7 +521,7 @@ fn textures_of_gltf() {
     assert_eq!(stage.materials[0].normal_texture, None);
     let skipped = [
         "textures with other coordinates than the first of their material",
-        "textures[3]: expected a PNG or JPEG source, found none",
+        "textures[3]: expected a PNG, JPEG or WebP source, found none",
     ];
     assert_eq!(stage.skipped, skipped);
     // A quarter turn, twice as often, moved by a half: (u, v) to (2 v + 0.5, -2 u).
@@ -561,7 +627,7 @@ fn quantized_positions() {
     assert_eq!(stage.mesh.vertices, [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 64.0 / 127.0, 0.0]]);
     let error = Stage::parse(MeshFormat::Gltf, text("").as_bytes(), None, &LIMITS).unwrap_err();
     assert!(
-        error.to_string().contains("accessors[0].componentType: expected one of [5126]"),
+        error.to_string().contains("accessors[0].componentType: expected 5126, or integers"),
         "{error}"
     );
 }

@@ -3,7 +3,9 @@
 use crate::interrupt::{self, Cancel};
 use crate::output::{print_json, thousands, usage};
 use anyhow::Context;
-use ropewalk_scene::{MeshLimits, MeshOutput, Recognised, Stage, recognise, write_atomically};
+use ropewalk_scene::{
+    MergeError, MeshLimits, MeshOutput, Recognised, Stage, recognise, write_atomically,
+};
 use serde::Serialize;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -16,6 +18,16 @@ pub struct Args {
     from: PathBuf,
     /// The file to write: .obj, .ply, .stl, .off or .glb, the binary form where there is one
     to: PathBuf,
+    /// Make one of vertices at the same place, or within a distance of the first one that is kept: --merge=0.001
+    #[arg(
+        long,
+        value_name = "DISTANCE",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "0",
+        allow_negative_numbers = true
+    )]
+    merge: Option<f64>,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,
@@ -27,6 +39,8 @@ struct Output {
     to: PathBuf,
     vertices: usize,
     triangles: usize,
+    /// Vertices that became others; none if that was not asked for.
+    merged: Option<usize>,
     bytes: u64,
     lost: Vec<String>,
     seconds: f64,
@@ -41,6 +55,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
             "{name}: expected a name that ends in .obj, .ply, .stl, .off or .glb"
         )));
     };
+    if let Some(distance) = args.merge.filter(|d| !(*d >= 0.0 && d.is_finite())) {
+        return Err(usage(MergeError::Distance(distance).to_string()));
+    }
     if is_same(&args.from, &args.to) {
         return Err(usage(format!("{}: the input itself is not overwritten", args.to.display())));
     }
@@ -57,7 +74,12 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     if cancel.is_set() {
         return Err(interrupt::interrupted());
     }
-    let stage = stage?;
+    let mut stage = stage?;
+    let merge = |distance| stage.mesh.merge_vertices(distance, &cancel);
+    let merged = match args.merge.map(merge).transpose() {
+        Err(MergeError::Cancelled) => return Err(interrupt::interrupted()),
+        merged => merged?,
+    };
     let written = write_atomically(&args.to, |out| -> io::Result<()> {
         stage.mesh.write(format, &mut Stoppable { out, cancel: &cancel })
     });
@@ -71,6 +93,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         to: args.to.clone(),
         vertices: stage.mesh.vertices.len(),
         triangles: stage.mesh.faces.len(),
+        merged,
         bytes: std::fs::metadata(&args.to).map_or(0, |data| data.len()),
         lost: lost(&stage, format),
         seconds: start.elapsed().as_secs_f64(),
@@ -84,6 +107,13 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         thousands(output.triangles as u64),
         thousands(output.bytes)
     );
+    if let Some(merged) = merged {
+        eprintln!(
+            "  merged: {} vertices, {} are left",
+            thousands(merged as u64),
+            thousands(output.vertices as u64)
+        );
+    }
     for what in &output.lost {
         eprintln!("  lost: {what}");
     }

@@ -19,6 +19,8 @@ struct MeshOutput {
     format: &'static str,
     vertices: usize,
     triangles: usize,
+    meshes: usize,
+    placements: usize,
     bounds: Option<[[f64; 3]; 2]>,
     normals: bool,
     texture_coordinates: bool,
@@ -186,6 +188,8 @@ impl MeshOutput {
             format: name(format),
             vertices: stage.mesh.vertices.len(),
             triangles: stage.mesh.faces.len(),
+            meshes: stage.meshes,
+            placements: stage.placements,
             bounds: bounds(&stage.mesh.vertices),
             normals: !stage.normals.is_empty(),
             texture_coordinates: !stage.uvs.is_empty(),
@@ -209,6 +213,10 @@ impl MeshOutput {
         writeln!(out, "{}: a mesh in {}", self.file, self.format)?;
         count(&mut out, "triangles", self.triangles)?;
         count(&mut out, "vertices", self.vertices)?;
+        if self.placements > 1 {
+            count(&mut out, "meshes", self.meshes)?;
+            count(&mut out, "  placed", self.placements)?;
+        }
         if let Some([low, high]) = &self.bounds {
             writeln!(out, "  box                   {low:?} to {high:?}")?;
         }

@@ -92,7 +92,7 @@ impl Mesh {
     }
 
     /// For each vertex the first one at its place.
-    fn places(&self) -> Vec<u32> {
+    pub(super) fn places(&self) -> Vec<u32> {
         // 0.0 and -0.0 are one place.
         let key = |i: u32| self.vertices[i as usize].map(|x| (x + 0.0).to_bits());
         let mut order: Vec<u32> = (0..self.vertices.len() as u32).collect();

@@ -1,8 +1,10 @@
 //! Triangle meshes from files: OBJ, PLY, STL, OFF and glTF 2.0, plain or gzipped.
 //!
-//! [`Mesh`] reads positions and faces, [`Stage`] what a file says of looks too. Whatever a file announces is
+//! [`Mesh`] reads positions and faces, [`PlacedMeshes`] keeps the meshes of nodes apart, [`Stage`] reads what a file says of looks
+//! too. Whatever a file announces is
 //! checked against its size before memory is taken for it, and every error says where it is and what was expected there.
-//! All but glTF is read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong.
+//! All but glTF is read piece by piece. [`Mesh::write`] writes positions and faces, [`Mesh::defects`] says what may be wrong,
+//! [`Mesh::merge_vertices`] makes one of vertices at one place, when asked to.
 
 mod beside;
 mod defects;
@@ -10,10 +12,12 @@ mod error;
 mod format;
 mod gltf;
 mod input;
+mod merge;
 mod mtl;
 mod obj;
 mod off;
 mod picture;
+mod placed;
 mod ply;
 mod polygon;
 mod skipped;
@@ -27,6 +31,8 @@ pub use error::{MeshError, MeshErrorKind, Place};
 pub(crate) use format::{HEAD, recognise};
 pub use format::{MeshFormat, Recognised};
 pub(crate) use input::GZIP_MAGIC;
+pub use merge::MergeError;
+pub use placed::{PlacedMeshes, Placement};
 pub use write::MeshOutput;
 
 use crate::stage::{Material, Stage};
@@ -61,6 +67,8 @@ pub struct MeshLimits {
     pub faces: usize,
     /// Corners of one polygon.
     pub corners: usize,
+    /// Placements of meshes by nodes.
+    pub placements: usize,
     /// Images of textures.
     pub images: usize,
     /// Pixels of all images together.
@@ -68,12 +76,14 @@ pub struct MeshLimits {
 }
 
 impl MeshLimits {
-    /// 8 GiB, 500 million vertices and as many triangles, a million corners, 1,024 images of 2^28 pixels (1 GiB).
+    /// 8 GiB, 500 million vertices and as many triangles, a million corners, 10 million placements, 1,024 images of
+    /// 2^28 pixels (1 GiB).
     pub const DEFAULT: MeshLimits = MeshLimits {
         bytes: 8 << 30,
         vertices: 500_000_000,
         faces: 500_000_000,
         corners: 1_000_000,
+        placements: 10_000_000,
         images: 1024,
         pixels: 1 << 28,
     };
@@ -142,17 +152,28 @@ pub(crate) fn read_file(
     monitor: &dyn Monitor,
 ) -> Result<Stage> {
     let watched = Watched { limits, monitor };
-    let read = || {
-        let mut input = Input::of_file(File::open(path)?, &watched)?;
+    open(path, &watched, |format, input| {
+        read_input(format, input, path.parent(), with_looks, &watched)
+    })
+}
+
+/// Opens a file and tells its format; errors get its name.
+fn open<'a, T>(
+    path: &Path,
+    limits: &'a Watched<'a>,
+    read: impl FnOnce(MeshFormat, Input<'a>) -> Result<T>,
+) -> Result<T> {
+    let opened = || {
+        let mut input = Input::of_file(File::open(path)?, limits)?;
         let size = input.size();
         let format = match recognise(path, input.ahead(HEAD)?, size) {
             Recognised::Mesh(format) => format,
             Recognised::Nff => return Err(format::not_a_mesh("a scene in NFF")),
             Recognised::Neither(what) => return Err(format::not_a_mesh(what)),
         };
-        read_input(format, input, path.parent(), with_looks, &watched)
+        read(format, input)
     };
-    read().map_err(|error: MeshError| error.in_file(path.display().to_string()))
+    opened().map_err(|error: MeshError| error.in_file(path.display().to_string()))
 }
 
 /// Reads bytes, with looks or without.
@@ -200,12 +221,29 @@ fn read_input(
         }
         MeshFormat::Stl => finished(stl::parse(input, soup, limits)?)?,
         MeshFormat::Off => finished(off::parse(input, soup, limits)?)?,
-        MeshFormat::Gltf => gltf::parse(&input.rest()?, soup, &beside, limits)?,
+        MeshFormat::Gltf => gltf::parse(input.rest()?, soup, &beside, limits)?,
     };
     if stage.materials.is_empty() {
         stage.materials.push(Material::default());
     }
+    if format != MeshFormat::Gltf {
+        (stage.meshes, stage.placements) = (1, 1);
+    }
     Ok(stage)
+}
+
+/// Meshes and their placements.
+fn placed_input(
+    format: MeshFormat,
+    input: Input<'_>,
+    folder: Option<&Path>,
+    limits: &Watched<'_>,
+) -> Result<PlacedMeshes> {
+    if format == MeshFormat::Gltf {
+        let beside = Beside::new(folder, limits.bytes);
+        return gltf::parse_placed(&input.rest()?, &beside, limits);
+    }
+    Ok(PlacedMeshes::of_mesh(read_input(format, input, folder, false, limits)?.mesh))
 }
 
 /// Limits, and who may cancel the reading.

@@ -1,4 +1,4 @@
-//! Images of textures: PNG and JPEG, with their size checked before they are decoded.
+//! Images of textures: PNG, JPEG and WebP, with their size checked before they are decoded.
 
 use super::beside::Beside;
 use super::skipped::Skipped;
@@ -130,7 +130,8 @@ fn decode(bytes: &[u8], pixels: u64) -> std::result::Result<Decoded, String> {
     let format = match bytes {
         [0x89, b'P', b'N', b'G', ..] => ImageFormat::Png,
         [0xff, 0xd8, ..] => ImageFormat::Jpeg,
-        _ => return Err("expected a PNG or JPEG image, found something else".to_owned()),
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => ImageFormat::WebP,
+        _ => return Err("expected a PNG, JPEG or WebP image, found something else".to_owned()),
     };
     let wrong = |e: image::ImageError| {
         format!("expected a sound image, found one of which the decoder says: {e}")
@@ -147,10 +148,42 @@ fn decode(bytes: &[u8], pixels: u64) -> std::result::Result<Decoded, String> {
     if width == 0 || height == 0 || u64::from(width) * u64::from(height) > pixels {
         return Err(format!("expected an image of 1 to {pixels} pixels, found {width} x {height}"));
     }
+    if format == ImageFormat::WebP {
+        check_webp(bytes, [width, height])?;
+    }
     let image = reader().decode().map_err(wrong)?;
     let has_alpha = image.color().has_alpha();
     let pixels = image.into_rgba8().into_raw().as_chunks::<4>().0.to_vec();
     Ok(Decoded { image: Image { width, height, pixels }, has_alpha })
+}
+
+/// Whether the picture within a WebP container is as large as that says: the decoder takes memory by what the picture says of
+/// itself, and compares afterwards.
+fn check_webp(bytes: &[u8], size: [u32; 2]) -> std::result::Result<(), String> {
+    let mut rest = &bytes[12..];
+    while let Some((head, body)) = rest.split_first_chunk::<8>() {
+        let length = u32::from_le_bytes([head[4], head[5], head[6], head[7]]) as usize;
+        let found = match (&head[..4], body) {
+            (b"VP8 ", &[_, _, _, _, _, _, a, b, c, d, ..]) => {
+                Some([[a, b], [c, d]].map(|n| u32::from(u16::from_le_bytes(n) & 0x3fff)))
+            }
+            (b"VP8L", &[_, a, b, c, d, ..]) => {
+                let bits = u32::from_le_bytes([a, b, c, d]);
+                Some([bits, bits >> 14].map(|n| (n & 0x3fff) + 1))
+            }
+            (b"ANMF", _) => return Err("expected one image, found an animation".to_owned()),
+            _ => None,
+        };
+        if let Some([width, height]) = found.filter(|found| *found != size) {
+            let [outer, down] = size;
+            return Err(format!(
+                "expected an image of {outer} x {down}, as its container says, found {width} x {height}"
+            ));
+        }
+        let next = length.checked_next_multiple_of(2).and_then(|length| body.get(length..));
+        rest = next.unwrap_or_default();
+    }
+    Ok(())
 }
 
 /// The file `name` beside the scene, for [`Pictures::get`].

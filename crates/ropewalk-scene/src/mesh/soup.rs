@@ -17,6 +17,8 @@ pub struct Soup {
     faces: Vec<[u32; 3]>,
     /// Polygons so far.
     polygons: usize,
+    /// Vertices and triangles that were read before into others and count for the limits.
+    before: [usize; 2],
     /// Polygons that name vertices which had not been read yet: their first faces, and their corners.
     deferred: Vec<(usize, Vec<u32>, Vec<[u32; 2]>)>,
     /// `None` if only positions and faces are wanted.
@@ -56,11 +58,27 @@ impl Soup {
         Soup { looks: with_looks.then(Looks::default), ..Soup::default() }
     }
 
+    /// An empty one for what follows under the same limits, without looks.
+    pub fn next(&self) -> Soup {
+        let [vertices, faces] = self.before;
+        let before = [vertices + self.vertices.len(), faces + self.faces.len()];
+        Soup { before, ..Soup::default() }
+    }
+
     /// Memory for what a file announces and its size allows.
     pub fn reserve(&mut self, vertices: usize, faces: usize, limits: &Watched<'_>) {
         // What cannot be had is asked for again, piece by piece, and then ends in an error.
         let _ = self.vertices.try_reserve_exact(vertices.min(limits.vertices));
         let _ = self.faces.try_reserve_exact(faces.min(limits.faces));
+    }
+
+    /// Memory for so many more, as exact as it can be without moving what is there again and again.
+    pub fn expect(&mut self, vertices: usize, faces: usize, limits: &Watched<'_>) {
+        if self.vertices.is_empty() && self.faces.is_empty() {
+            return self.reserve(vertices, faces, limits);
+        }
+        let _ = self.vertices.try_reserve(vertices.min(limits.vertices));
+        let _ = self.faces.try_reserve(faces.min(limits.faces));
     }
 
     /// Triangles so far.
@@ -89,7 +107,7 @@ impl Soup {
             let what = format!("a finite coordinate within f32 for vertex {count}");
             return Err(wrong(place(), what, x));
         }
-        if count >= limits.vertices.min(NONE as usize) {
+        if count >= NONE as usize || self.before[0] + count >= limits.vertices {
             return Err(wrong(place(), format!("at most {} vertices", limits.vertices), "more"));
         }
         self.vertices.push(point);
@@ -112,7 +130,7 @@ impl Soup {
             let what = format!("a face of at most {} corners", limits.corners);
             return Err(wrong(place(), what, count));
         }
-        if self.faces.len() + count - 2 > limits.faces {
+        if self.before[1] + self.faces.len() + count - 2 > limits.faces {
             return Err(wrong(place(), format!("at most {} triangles", limits.faces), "more"));
         }
         self.polygons += 1;

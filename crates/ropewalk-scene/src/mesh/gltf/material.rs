@@ -5,17 +5,17 @@ use super::super::beside::Beside;
 use super::super::error::{Result, wrong};
 use super::super::picture::{Pictures, load};
 use super::super::skipped::Skipped;
+use super::buffer::{Buffers, decode_percent, fetch};
 use super::node::numbers;
-use super::{array, decode_percent, entry, fetch, integer, part};
+use super::{array, entry, integer, part};
 use crate::stage::{Alpha, Material, Texture, Wrap};
 use serde_json::Value;
-use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// Where images come from.
 pub struct Source<'a> {
     pub json: &'a Value,
-    pub buffers: &'a [Cow<'a, [u8]>],
+    pub buffers: &'a Buffers<'a>,
     pub beside: &'a Beside<'a>,
 }
 
@@ -206,8 +206,11 @@ fn texture(
     };
     let texture = entry(json, "textures", index, "textureInfo.index")?;
     let name = format!("textures[{index}]");
-    let Some(image) = integer(texture, "source", &name)? else {
-        skipped.note(format!("{name}: expected a PNG or JPEG source, found none"));
+    let webp = integer(&texture["extensions"]["EXT_texture_webp"], "source", &name)?;
+    let Some(image) =
+        webp.map_or_else(|| integer(texture, "source", &name), |webp| Ok(Some(webp)))?
+    else {
+        skipped.note(format!("{name}: expected a PNG, JPEG or WebP source, found none"));
         return Ok(None);
     };
     let picture = entry(json, "images", image, &format!("{name}.source"))?;
@@ -241,12 +244,8 @@ fn texture(
 
 /// The bytes of an image in a buffer.
 fn view<'a>(picture: &Value, source: &'a Source<'_>) -> std::result::Result<&'a [u8], String> {
-    let number = |json: &Value, key: &str| json[key].as_u64().and_then(|x| usize::try_from(x).ok());
-    let found = number(picture, "bufferView").and_then(|view| {
-        let view = array(source.json, "bufferViews").get(view)?;
-        let bytes = source.buffers.get(number(view, "buffer")?)?;
-        let start = number(view, "byteOffset").unwrap_or(0);
-        bytes.get(start..)?.get(..number(view, "byteLength")?)
-    });
-    found.ok_or_else(|| "expected a uri or bytes of a buffer, found neither".to_owned())
+    let index = picture["bufferView"].as_u64().and_then(|x| usize::try_from(x).ok());
+    let json = index.and_then(|index| array(source.json, "bufferViews").get(index));
+    let bytes = json.and_then(|json| source.buffers.view(json, "bufferView").ok());
+    bytes.ok_or_else(|| "expected a uri or bytes of a buffer, found neither".to_owned())
 }

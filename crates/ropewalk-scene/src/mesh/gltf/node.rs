@@ -105,6 +105,8 @@ pub fn note_skipped(json: &Value, soup: &mut Soup) {
         soup.skip("scenes besides the default one");
     }
     let known = [
+        "EXT_mesh_gpu_instancing",
+        "EXT_texture_webp",
         "KHR_lights_punctual",
         "KHR_materials_emissive_strength",
         "KHR_materials_ior",
