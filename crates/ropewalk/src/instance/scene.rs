@@ -148,7 +148,8 @@ impl InstancedScene {
         let mut boxes = Vec::with_capacity(instances.len());
         let mut largest = 0.0f64;
         for (instance, placed) in instances.iter().enumerate() {
-            let Some((low, high)) = placed.object.geometry.bounds() else { continue };
+            // An object without triangles has a box too, since boxes and instances go by the same numbers.
+            let (low, high) = placed.object.geometry.bounds().unwrap_or(([0.0; 3], [0.0; 3]));
             let mut corners = [[0.0; 3]; 8];
             for (i, corner) in corners.iter_mut().enumerate() {
                 let side = |a: usize| if i >> a & 1 == 1 { high[a] } else { low[a] };
