@@ -97,7 +97,12 @@ impl PlacedMeshes {
         for Placement { mesh, transform, .. } in &self.placements {
             let mesh = &self.meshes[*mesh as usize];
             let first = flat.vertices.len() as u32;
-            flat.vertices.extend(mesh.vertices.iter().map(|&vertex| moved(transform, vertex)));
+            if *transform == IDENTITY {
+                // What stays where it is keeps the signs of its zeros, which a sum of products would not.
+                flat.vertices.extend(&mesh.vertices);
+            } else {
+                flat.vertices.extend(mesh.vertices.iter().map(|&vertex| moved(transform, vertex)));
+            }
             let is_mirrored = is_mirrored(transform);
             flat.faces.extend(mesh.faces.iter().map(|face| {
                 let [a, b, c] = face.map(|corner| first + corner);

@@ -202,8 +202,10 @@ impl<'a> Reader<'a> {
         let (soup, limits) = (&mut self.soup, self.limits);
         soup.expect(count, triangles, limits);
         let place = || part(format!("accessors[{positions}]"));
+        // What stays where it is keeps the signs of its zeros: see `PlacedMeshes::flatten`.
+        let mover = matrix.filter(|matrix| **matrix != IDENTITY);
         points.rows(|point| {
-            let point = matrix.map_or(point, |matrix| moved(matrix, point));
+            let point = mover.map_or(point, |matrix| moved(matrix, point));
             soup.vertex(place, point, limits)
         })?;
         if self.soup.looks.is_some() {
