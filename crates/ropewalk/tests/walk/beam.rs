@@ -217,6 +217,28 @@ fn incoherent_rays_are_left_to_the_wave() {
     }
 }
 
+/// Few rays of each sixteen look elsewhere, as behind a silhouette: together they are worth a beam.
+#[test]
+fn unlike_rays_share_packets() {
+    for round in 0..6 {
+        let mut draw = Draw::new(600 + round);
+        let geometry = scenes::soup(&mut draw, 200, 1.0);
+        let tree = tree(&mut draw, &geometry);
+        let eye = draw.point_in(&geometry.bounds());
+        let [one, other] = [draw.direction(), draw.direction()];
+        let looks = |dir: [f32; 3], draw: &mut Draw| {
+            let off = draw.direction().map(|d| 0.01 * d);
+            Ray::new(eye, std::array::from_fn(|a| dir[a] + off[a]))
+        };
+        // Of 1,000 rays, so that the last group is not full.
+        let few = |i: usize| matches!(i % 16, 2 | 7 | 11);
+        let rays = (0..1_000).map(|i| looks(if few(i) { one } else { other }, &mut draw));
+        let rays: Vec<Ray> = rays.collect();
+        let [closest, occluded] = check(&geometry, &tree, &rays);
+        assert!(share(closest) > 0.9 && share(occluded) > 0.9, "{closest:?} {occluded:?}");
+    }
+}
+
 #[test]
 fn groups_that_diverge_are_given_up_or_split() {
     let mut draw = Draw::new(400);

@@ -39,7 +39,45 @@ pub struct Facets {
     culled: u32,
 }
 
-/// Which triangles may be hit by a packet, one bit each.
+/// Two packets as a block sees them: a lane for each of its triangles and each of the two.
+#[repr(C, align(64))]
+#[derive(Clone)]
+pub struct Couple {
+    middle: [[f32; 2 * WIDTH]; 2],
+    radius: [[f32; 2 * WIDTH]; 2],
+    nearest: [f32; 2 * WIDTH],
+    farthest: [f32; 2 * WIDTH],
+}
+
+impl Couple {
+    /// No packets.
+    pub const EMPTY: Couple = Couple {
+        middle: [[0.0; 2 * WIDTH]; 2],
+        radius: [[0.0; 2 * WIDTH]; 2],
+        nearest: [0.0; 2 * WIDTH],
+        farthest: [0.0; 2 * WIDTH],
+    };
+
+    /// Puts a packet in place 0 or 1.
+    #[inline(always)]
+    pub fn set(&mut self, place: usize, packet: &Packet) {
+        let lanes = WIDTH * place..WIDTH * (place + 1);
+        for i in 0..2 {
+            self.middle[i][lanes.clone()].fill(packet.middle[i]);
+            self.radius[i][lanes.clone()].fill(packet.radius[i]);
+        }
+        self.nearest[lanes].fill(packet.nearest);
+        self.set_farthest(place, packet);
+    }
+
+    /// The same where only the depth of hits has changed.
+    #[inline(always)]
+    pub fn set_farthest(&mut self, place: usize, packet: &Packet) {
+        self.farthest[WIDTH * place..WIDTH * (place + 1)].fill(packet.farthest);
+    }
+}
+
+/// Which triangles may be hit by two packets, a byte of bits for each of the two.
 pub struct Facing {
     /// Those that all rays see from one side.
     pub clear: u32,
@@ -103,35 +141,35 @@ impl Facets {
         }
     }
 
-    /// Edge function `e` in the middle of a packet, how far it may be from that in the packet, and its
+    /// Edge function `e` in the middles of two packets, how far it may be from that in each, and its
     /// two factors.
     #[inline(always)]
-    unsafe fn reach<V: Vector>(&self, e: usize, packet: &Packet) -> [V; 4] {
-        // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
+    unsafe fn reach<V: Vector>(&self, e: usize, couple: &Couple) -> [V; 4] {
+        // SAFETY: passed on to the caller; rows have `WIDTH` numbers, those of couples twice as many.
         unsafe {
-            let (a, b) = (V::splat(packet.middle[0]), V::splat(packet.middle[1]));
-            let (ra, rb) = (V::splat(packet.radius[0]), V::splat(packet.radius[1]));
+            let (a, b) = (V::load(&couple.middle[0]), V::load(&couple.middle[1]));
+            let (ra, rb) = (V::load(&couple.radius[0]), V::load(&couple.radius[1]));
             let [constant, by_a, by_b] = &self.edge[e];
-            let (by_a, by_b) = (V::load(by_a), V::load(by_b));
-            let middle = b.mul_add(by_b, a.mul_add(by_a, V::load(constant)));
-            let reach = rb.mul_add(by_b.abs(), ra.mul_add(by_a.abs(), V::load(&self.slack)));
+            let (by_a, by_b) = (twice::<V>(by_a), twice::<V>(by_b));
+            let middle = b.mul_add(by_b, a.mul_add(by_a, twice(constant)));
+            let reach = rb.mul_add(by_b.abs(), ra.mul_add(by_a.abs(), twice(&self.slack)));
             [middle, reach, by_a, by_b]
         }
     }
 
-    /// The triangles that some ray of the packet may hit.
+    /// The triangles that some ray of two packets may hit from depth `enter` on.
     ///
     /// # Safety
-    /// As for [`Vector::splat`].
+    /// As for [`Vector::splat`]; `V` must have twice [`WIDTH`] lanes.
     #[inline(always)]
-    pub unsafe fn facing<V: Vector>(&self, packet: &Packet) -> Facing {
-        // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
+    pub unsafe fn facing<V: Vector>(&self, couple: &Couple, enter: f32) -> Facing {
+        // SAFETY: passed on to the caller; rows have `WIDTH` numbers, those of couples twice as many.
         unsafe {
-            let (ra, rb) = (V::splat(packet.radius[0]), V::splat(packet.radius[1]));
-            let slack = V::load(&self.slack);
-            let u = self.reach::<V>(0, packet);
-            let v = self.reach::<V>(1, packet);
-            let w = self.reach::<V>(2, packet);
+            let (ra, rb) = (V::load(&couple.radius[0]), V::load(&couple.radius[1]));
+            let slack = twice::<V>(&self.slack);
+            let u = self.reach::<V>(0, couple);
+            let v = self.reach::<V>(1, couple);
+            let w = self.reach::<V>(2, couple);
             let zero = V::splat(0.0);
             let high = (u[0] + u[1]).min(v[0] + v[1]).min(w[0] + w[1]);
             let low = (u[0] - u[1]).max(v[0] - v[1]).max(w[0] - w[1]);
@@ -139,15 +177,24 @@ impl Facets {
             let reach = ra.mul_add((u[2] + v[2] + w[2]).abs(), slack + slack);
             let reach = rb.mul_add((u[3] + v[3] + w[3]).abs(), reach);
             let clear = reach.lt(sum);
-            let ahead = V::load(&self.range[0]).le(V::splat(packet.farthest))
-                & V::splat(packet.nearest).le(V::load(&self.range[1]));
+            let farthest = V::load(&couple.farthest);
+            let near = twice::<V>(&self.range[0]).max(V::splat(enter));
+            let ahead = near.le(farthest) & V::load(&couple.nearest).le(twice(&self.range[1]));
             let front = zero.le(high);
+            let culled = self.culled | self.culled << WIDTH;
             Facing {
-                clear: clear & ahead & front & !self.culled,
+                clear: clear & ahead & front & !culled,
                 edge_on: !clear & ahead & (front | low.le(zero)),
             }
         }
     }
+}
+
+/// A row for each of two packets.
+#[inline(always)]
+unsafe fn twice<V: Vector>(row: &Row) -> V {
+    // SAFETY: passed on to the caller; rows have `WIDTH` numbers.
+    unsafe { V::load_two(row, row) }
 }
 
 /// A vertex of eight triangles in a frame: `x`, `y`, `z` and `h`.
@@ -188,6 +235,20 @@ impl Facets {
             let [constant, by_a, by_b] = &self.edge[e];
             let u = a.mul_add(V::splat(by_a[i]), V::splat(constant[i]));
             b.mul_add(V::splat(by_b[i]), u)
+        }
+    }
+
+    /// The active rays of a packet that triangle `i`, seen from one side, may lie in the way of, whatever its depth.
+    ///
+    /// # Safety
+    /// As for [`Vector::splat`].
+    #[inline(always)]
+    pub unsafe fn touched<V: Vector>(&self, i: usize, packet: &Packet) -> u32 {
+        // SAFETY: passed on to the caller; rows have `RAYS` numbers.
+        unsafe {
+            let (a, b) = (V::load(&packet.at[0]), V::load(&packet.at[1]));
+            let (u, v, w) = (self.at(0, i, a, b), self.at(1, i, a, b), self.at(2, i, a, b));
+            V::splat(-self.slack[i]).le(u.min(v).min(w)) & packet.active
         }
     }
 

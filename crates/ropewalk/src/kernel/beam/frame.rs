@@ -10,6 +10,9 @@ use crate::ray::Ray;
 /// Rays of a packet.
 pub const RAYS: usize = 16;
 
+/// All lanes of a packet.
+pub const ALL: u32 = (1 << RAYS) - 1;
+
 /// Half an ulp of 1.
 const U: f32 = f32::EPSILON / 2.0;
 
@@ -39,6 +42,9 @@ const CROSSING_SLACK: f32 = 6.0 * U;
 /// Rays may miss the common focus, or differ from the common direction over the reach, by so much.
 const STRAY: f32 = 256.0 * U;
 
+/// Most that rays may miss a point where others met, in units of what those missed it by.
+const STRAY_AGAIN: f32 = 1.5;
+
 /// Largest distance of a focus from the leading ray's origin, in units of the scene's reach.
 const FOCUS: f32 = 16.0;
 
@@ -53,8 +59,8 @@ const NONE_BITS: f32 = f32::from_bits(NONE);
 #[repr(C, align(64))]
 #[derive(Clone)]
 pub struct Packet {
-    /// Where the rays stand in the batch.
-    pub index: [u32; RAYS],
+    /// Where the ray of lane 0 stands in the batch; the others follow.
+    pub first: u32,
     /// Origins by axis.
     pub origin: [[f32; RAYS]; 3],
     /// Directions by axis.
@@ -97,7 +103,7 @@ pub struct Packet {
 impl Packet {
     /// A packet without rays.
     pub const EMPTY: Packet = Packet {
-        index: [0; RAYS],
+        first: 0,
         origin: [[0.0; RAYS]; 3],
         dir: [[0.0; RAYS]; 3],
         t: [[0.0; RAYS]; 2],
@@ -123,9 +129,9 @@ impl Packet {
     #[inline(always)]
     pub fn load(&mut self, rays: &[Ray], first: u32) {
         let count = rays.len().min(RAYS);
-        self.lanes = ((1u32 << count) - 1) & 0xFFFF;
+        self.lanes = ((1u32 << count) - 1) & ALL;
+        self.first = first;
         for (lane, ray) in rays[..count].iter().enumerate() {
-            self.index[lane] = first + lane as u32;
             for a in 0..3 {
                 self.origin[a][lane] = ray.origin[a];
                 self.dir[a][lane] = ray.dir[a];
@@ -167,21 +173,6 @@ impl Packet {
         }
     }
 
-    /// Largest distance of the origins of `lanes` from a point, by axis.
-    #[inline(always)]
-    unsafe fn away<V: Vector>(&self, point: [f32; 3], lanes: u32) -> [f32; 3] {
-        // SAFETY: passed on to the caller.
-        unsafe {
-            let zero = V::splat(0.0);
-            let mut far = [0.0; 3];
-            for a in 0..3 {
-                let away = (V::load(&self.origin[a]) - V::splat(point[a])).abs();
-                far[a] = away.select(lanes, zero).highest();
-            }
-            far
-        }
-    }
-
     /// Depths of the origins, and where the rays cross the frame's plane of depth 0.
     #[inline(always)]
     unsafe fn cross<V: Vector>(&mut self, frame: &Frame) {
@@ -204,13 +195,28 @@ impl Packet {
 /// Largest distance of the packets' origins from a point, on any axis.
 #[inline(always)]
 unsafe fn away<V: Vector>(packets: &[Packet], point: [f32; 3]) -> f32 {
-    let mut far = 0.0;
-    for p in packets {
-        // SAFETY: passed on to the caller.
-        let [x, y, z] = unsafe { p.away::<V>(point, p.lanes) };
-        far = x.max(y).max(z).max(far);
+    // SAFETY: passed on to the caller; rows have `RAYS` numbers.
+    unsafe {
+        let zero = V::splat(0.0);
+        let mut far = zero;
+        for p in packets {
+            let mut most = zero;
+            for (row, x) in p.origin.iter().zip(point) {
+                most = most.larger_size(V::load(row) - V::splat(x));
+            }
+            far = far.max(most.select(p.lanes, zero));
+        }
+        far.highest()
     }
-    far
+}
+
+/// Largest distance of the scene from a point, on any axis.
+#[inline(always)]
+fn scene(bounds: &Aabb, point: [f32; 3]) -> f32 {
+    (0..3).fold(0.0f32, |reach, a| {
+        let (low, high) = (bounds.min[a] - point[a], bounds.max[a] - point[a]);
+        reach.max(low.abs()).max(high.abs())
+    })
 }
 
 /// Bounds of coordinates and directions within which no product overflows or vanishes.
@@ -272,44 +278,48 @@ impl Frame {
         scale > 0.0 && near(x, self.slope[0]) && near(y, self.slope[1])
     }
 
-    /// Finds the family of the packets' lanes; `None` if they have none in this scene.
+    /// Finds the family of the packets' lanes; `None` if they have none in this scene. `met` is where the
+    /// rays of a beam before met, which is tried first, and by what share of the reach they missed it.
     ///
     /// # Safety
     /// As for [`Vector::splat`].
     #[inline(always)]
-    pub unsafe fn fit<V: Vector>(mut self, packets: &mut [Packet], bounds: &Aabb) -> Option<Frame> {
+    pub unsafe fn fit<V: Vector>(
+        mut self,
+        packets: &mut [Packet],
+        bounds: &Aabb,
+        met: &mut Option<([f32; 3], f32)>,
+    ) -> Option<Frame> {
         // SAFETY: passed on to the caller.
         unsafe {
-            let scene = |point: [f32; 3]| {
-                (0..3).fold(0.0f32, |reach, a| {
-                    let (low, high) = (bounds.min[a] - point[a], bounds.max[a] - point[a]);
-                    reach.max(low.abs()).max(high.abs())
-                })
-            };
             let leader = self.point;
             let around = away::<V>(packets, leader);
-            self.reach = scene(leader).max(around);
-            self.cross_all::<V>(packets);
-            if around > 0.0 {
+            self.reach = scene(bounds, leader).max(around);
+            if around == 0.0 {
+                self.cross_all::<V>(packets);
+            } else if let Some((point, missed)) = *met
+                && self.meets::<V>(packets, bounds, point, STRAY_AGAIN * missed)
+            {
+            } else {
+                self.point = leader;
+                self.reach = scene(bounds, leader).max(around);
+                self.cross_all::<V>(packets);
                 let (focus, spread) = self.focus::<V>(packets);
                 self.concentric = focus.abs() <= FOCUS * self.reach;
                 if self.concentric {
                     let [kx, ky, kz] = self.axis;
                     let [x, y] = self.mean::<V>(packets, |p| &p.at);
                     let [sx, sy] = self.mean::<V>(packets, |p| &p.slope);
-                    self.point[kx] = leader[kx] + (x + sx * focus);
-                    self.point[ky] = leader[ky] + (y + sy * focus);
-                    self.point[kz] = leader[kz] + focus * self.sign;
-                    self.reach = scene(self.point).max(away::<V>(packets, self.point));
-                    self.cross_all::<V>(packets);
-                    let stray = self.extent::<V>(packets, |p| &p.at);
-                    let stray = stray.iter().flatten().fold(0.0, |m: f32, x| m.max(x.abs()));
-                    self.stray = stray + CROSSING_SLACK * self.offset::<V>(packets);
-                    self.concentric = self.stray <= STRAY * self.reach;
+                    let mut point = leader;
+                    point[kx] += x + sx * focus;
+                    point[ky] += y + sy * focus;
+                    point[kz] += focus * self.sign;
+                    self.concentric = self.meets::<V>(packets, bounds, point, STRAY);
+                    *met = self.concentric.then_some((point, self.stray / self.reach));
                 }
                 if !self.concentric {
                     self.point = leader;
-                    self.reach = scene(leader).max(around);
+                    self.reach = scene(bounds, leader).max(around);
                     self.cross_all::<V>(packets);
                     self.stray = (2.0 * spread + CROSSING_SLACK) * self.reach;
                     if self.stray > STRAY * self.reach {
@@ -319,6 +329,43 @@ impl Frame {
             }
             let far = self.point.iter().fold(self.reach, |m, x| m.max(x.abs()));
             (self.reach >= REACH_MIN && far <= COORDINATE_MAX).then_some(self)
+        }
+    }
+
+    /// Takes a point as that where the rays meet, and says whether they stray from it by `most` times the reach at most.
+    #[inline(always)]
+    unsafe fn meets<V: Vector>(
+        &mut self,
+        packets: &mut [Packet],
+        bounds: &Aabb,
+        point: [f32; 3],
+        most: f32,
+    ) -> bool {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            self.point = point;
+            self.reach = scene(bounds, point).max(away::<V>(packets, point));
+            self.cross_all::<V>(packets);
+            self.stray = self.miss::<V>(packets);
+            self.stray <= most * self.reach
+        }
+    }
+
+    /// Bound of the distance by which a ray misses the point.
+    #[inline(always)]
+    unsafe fn miss<V: Vector>(&self, packets: &[Packet]) -> f32 {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            let zero = V::splat(0.0);
+            let (mut miss, mut offset) = (zero, zero);
+            for p in packets {
+                let across = V::load(&p.at[0]).larger_size(V::load(&p.at[1]));
+                let slope = V::load(&p.slope[0]).larger_size(V::load(&p.slope[1]));
+                miss = miss.max(across.select(p.lanes, zero));
+                let product = (slope * V::load(&p.start)).abs();
+                offset = offset.max(product.select(p.lanes, zero));
+            }
+            CROSSING_SLACK.mul_add(offset.highest(), miss.highest())
         }
     }
 
@@ -351,23 +398,6 @@ impl Frame {
                 extent[i] = [low.lowest(), high.highest()];
             }
             extent
-        }
-    }
-
-    /// Largest product of the depth of an origin and a slope.
-    #[inline(always)]
-    unsafe fn offset<V: Vector>(&self, packets: &[Packet]) -> f32 {
-        // SAFETY: passed on to the caller.
-        unsafe {
-            let zero = V::splat(0.0);
-            let mut most = zero;
-            for p in packets {
-                for slope in &p.slope {
-                    let offset = (V::load(slope) * V::load(&p.start)).abs();
-                    most = most.max(offset.select(p.lanes, zero));
-                }
-            }
-            most.highest()
         }
     }
 

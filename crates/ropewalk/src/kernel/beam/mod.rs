@@ -1,12 +1,14 @@
 //! The beam: rays that keep together walk the tree together.
 //!
 //! ```text
-//! group    64 rays in turn, or 16, that have like directions and either meet in one point (an eye, a
-//!          light) or are parallel: two numbers tell them apart
+//! group    128, 64 or 16 rays in turn that have like directions and either meet in one point (an eye, a
+//!          light) or are parallel: two numbers tell them apart. Of 64 rays, those that are unlike the
+//!          first are a beam of their own, as behind a silhouette
 //! walk     intervals of these numbers bound where the rays cross a plane, so one step serves all
 //! test     in a leaf, 8 triangles at a time are projected into the group's frame, where edge functions
-//!          are linear in the two numbers; those that no ray of a packet of 16 can hit are dropped, each
-//!          of the others is tested with 16 rays at once
+//!          are linear in the two numbers; pairs of a triangle and a packet of 16 rays that have nothing
+//!          to do with each other are dropped, two packets at a time, then one by one without a branch;
+//!          each of the others is tested with 16 rays at once
 //! settle   f32 decides where it is certain, within a derived bound; what it cannot tell is decided
 //!          by the reference test, and the parameters of the winners are computed in f64
 //! ```
@@ -40,20 +42,40 @@ use crate::ray::Ray;
 use crate::wide::{
     BLOCK_LINES, Block, ID_MASK, LEAF, LINE, WIDTH, WideTree, code_line, code_offset,
 };
-use facets::Facets;
-use frame::{Frame, NONE, Packet, RAYS};
+use facets::{Couple, Facets};
+use frame::{ALL, Frame, NONE, Packet, RAYS};
 use settle::Corners;
 use shaft::Stack;
 use std::ops::Range;
 
 /// Packets of a beam.
-const PACKETS: usize = 4;
+const PACKETS: usize = 8;
 
-/// What a ray of a beam may cost, in units of [`Beams::spent`].
-const BUDGET: u32 = 20;
+/// Packets of a beam of medium size.
+const HALF: usize = 4;
 
-/// Most beams that are skipped in a row.
+/// Sizes of beams: one packet, up to [`HALF`], up to [`PACKETS`].
+const SMALL: usize = 0;
+const MEDIUM: usize = 1;
+const LARGE: usize = 2;
+
+/// Most packets of a beam of the next smaller size.
+const FEWER: [usize; 3] = [0, 1, HALF];
+
+/// What a ray of a beam of each size may cost, in units of [`Beams::spent`].
+const BUDGET: [u32; 3] = [20, 20, 10];
+
+/// The size of a beam of so many packets.
+#[inline(always)]
+fn size(packets: usize) -> usize {
+    usize::from(packets > FEWER[MEDIUM]) + usize::from(packets > FEWER[LARGE])
+}
+
+/// Most beams of a size that are skipped in a row.
 const LONGEST: u32 = 64;
+
+/// Most groups of [`PACKETS`] packets in a row at which nothing looks at all.
+const LONGEST_GROUPS: u32 = 16;
 
 /// Cells behind the next that are asked for after a step.
 const AHEAD: usize = 2;
@@ -61,7 +83,10 @@ const AHEAD: usize = 2;
 /// Fewest rays of a packet that are worth a beam.
 const FEWEST: u32 = 4;
 
-/// Most beams that sixteen rays are divided into.
+/// Fewest rays of several packets that are worth a beam.
+const FEWEST_MIXED: u32 = 10;
+
+/// Most beams that rays of the same packets are divided into.
 const LEADERS: usize = 3;
 
 /// Primitives that a beam remembers.
@@ -82,7 +107,7 @@ impl Mailboxes {
     #[inline(always)]
     fn is_new(&mut self, prim_id: u32, k: usize) -> bool {
         let at = prim_id as usize % MAILBOXES;
-        let seen = if self.id[at] == prim_id { self.packets[at] } else { 0 };
+        let seen = self.packets[at] & u8::from(self.id[at] == prim_id).wrapping_neg();
         (self.id[at], self.packets[at]) = (prim_id, seen | 1 << k);
         seen >> k & 1 == 0
     }
@@ -90,9 +115,9 @@ impl Mailboxes {
 
 /// A query that beams can answer: each ray has one answer.
 pub trait BeamQuery: BatchQuery {
-    /// Takes the answers of some lanes: parameters and primitives, infinite and [`NONE`] for misses.
-    /// Any-hit queries look at the primitives only.
-    fn answer(&mut self, rays: &[u32; RAYS], lanes: u32, t: &[f32; RAYS], prim_id: &[u32; RAYS]);
+    /// Takes the answers of some lanes, which stand at `first` and behind: parameters and primitives, infinite and [`NONE`]
+    /// for misses. Any-hit queries look at the primitives only.
+    fn answer(&mut self, first: u32, lanes: u32, t: &[f32; RAYS], prim_id: &[u32; RAYS]);
 
     /// Lets `walk` put the same question to rays that have been moved, and answers them where they
     /// stood.
@@ -115,10 +140,16 @@ pub struct Answers {
 
 impl BeamQuery for Closest<'_> {
     #[inline(always)]
-    fn answer(&mut self, rays: &[u32; RAYS], lanes: u32, t: &[f32; RAYS], prim_id: &[u32; RAYS]) {
+    fn answer(&mut self, first: u32, lanes: u32, t: &[f32; RAYS], prim_id: &[u32; RAYS]) {
+        let first = first as usize;
+        if lanes == ALL {
+            self.t[first..first + RAYS].copy_from_slice(t);
+            self.prim[first..first + RAYS].copy_from_slice(prim_id);
+            return;
+        }
         for lane in (0..RAYS).filter(|lane| lanes >> lane & 1 == 1) {
-            self.t[rays[lane] as usize] = t[lane];
-            self.prim[rays[lane] as usize] = prim_id[lane];
+            self.t[first + lane] = t[lane];
+            self.prim[first + lane] = prim_id[lane];
         }
     }
 
@@ -136,9 +167,17 @@ impl BeamQuery for Closest<'_> {
 
 impl BeamQuery for Any<'_> {
     #[inline(always)]
-    fn answer(&mut self, rays: &[u32; RAYS], lanes: u32, _t: &[f32; RAYS], prim_id: &[u32; RAYS]) {
+    fn answer(&mut self, first: u32, lanes: u32, _t: &[f32; RAYS], prim_id: &[u32; RAYS]) {
+        let first = first as usize;
+        if lanes == ALL {
+            let hit = &mut self.hit[first..first + RAYS];
+            for (hit, &prim_id) in hit.iter_mut().zip(prim_id) {
+                *hit = prim_id != NONE;
+            }
+            return;
+        }
         for lane in (0..RAYS).filter(|lane| lanes >> lane & 1 == 1) {
-            self.hit[rays[lane] as usize] = prim_id[lane] != NONE;
+            self.hit[first + lane] = prim_id[lane] != NONE;
         }
     }
 
@@ -210,6 +249,7 @@ impl std::ops::Add for BatchReport {
 pub struct Room {
     stack: Stack,
     packets: [Packet; PACKETS],
+    couples: [Couple; PACKETS / 2],
     facets: Facets,
     corners: Corners,
     tested: Mailboxes,
@@ -221,6 +261,7 @@ impl Room {
         Room {
             stack: Stack::EMPTY,
             packets: [Packet::EMPTY; PACKETS],
+            couples: [Couple::EMPTY; PACKETS / 2],
             facets: Facets::EMPTY,
             corners: Corners::EMPTY,
             tested: Mailboxes::EMPTY,
@@ -229,13 +270,15 @@ impl Room {
 }
 
 /// Whether beams of a size are tried: after each that was too wide, twice as many are skipped.
+#[derive(Clone, Copy)]
 struct Patience {
     skip: u32,
     next: u32,
+    longest: u32,
 }
 
 impl Patience {
-    const NEW: Patience = Patience { skip: 0, next: 1 };
+    const NEW: Patience = Patience { skip: 0, next: 1, longest: LONGEST };
 
     fn tries(&mut self) -> bool {
         let tries = self.skip == 0;
@@ -247,7 +290,7 @@ impl Patience {
         if done {
             self.next = (self.next / 2).max(1);
         } else {
-            (self.skip, self.next) = (self.next, (2 * self.next).min(LONGEST));
+            (self.skip, self.next) = (self.next, (2 * self.next).min(self.longest));
         }
     }
 }
@@ -260,8 +303,10 @@ pub struct Beams<'a, Q> {
     room: &'a mut Room,
     left: &'a mut Vec<u32>,
     report: BatchReport,
-    large: Patience,
-    small: Patience,
+    /// By size.
+    patience: [Patience; 3],
+    /// Where the rays of a beam have met of late, and the share of the reach by which they missed it.
+    met: Option<([f32; 3], f32)>,
 }
 
 /// Answers the coherent rays of a batch and puts the others on the list `left`.
@@ -279,47 +324,121 @@ pub unsafe fn beams<L: BeamSimd, Q: BeamQuery>(
 ) -> BatchReport {
     let exact = Exact { lines: tree.lines(), rays };
     let report = BatchReport::default();
-    let (large, small) = (Patience::NEW, Patience::NEW);
-    let mut beams = Beams { tree, exact, query, room, left, report, large, small };
+    let patience = [Patience::NEW; 3];
+    let mut beams = Beams { tree, exact, query, room, left, report, patience, met: None };
+    let mut groups = Patience { longest: LONGEST_GROUPS, ..Patience::NEW };
     for first in (0..rays.len()).step_by(PACKETS * RAYS) {
+        let range = first..rays.len().min(first + PACKETS * RAYS);
+        if !groups.tries() {
+            beams.left.extend(range.start as u32..range.end as u32);
+            continue;
+        }
+        let answered = beams.report.beam_rays;
         // SAFETY: passed on to the caller.
-        unsafe { beams.group::<L>(first) };
+        unsafe { beams.group::<L>(range) };
+        groups.learn(beams.report.beam_rays > answered);
     }
     beams.report
 }
 
 impl<Q: BeamQuery> Beams<'_, Q> {
-    /// Tries up to 64 rays as one beam, else each sixteen of them.
-    ///
-    /// A few rays are looked at before any are put side by side, so that incoherent batches lose
-    /// next to nothing here.
+    /// Tries up to 128 rays as one beam, else each 64 of them, else each sixteen.
     #[inline(always)]
-    unsafe fn group<L: BeamSimd>(&mut self, first: usize) {
-        let end = self.exact.rays.len().min(first + PACKETS * RAYS);
-        let rays = &self.exact.rays[first..end];
-        let leader = Frame::of(&rays[0]);
+    unsafe fn group<L: BeamSimd>(&mut self, range: Range<usize>) {
+        let end = range.end;
         // SAFETY: passed on to the caller.
         unsafe {
-            if rays.len() > RAYS
-                && let Some(frame) = leader
-                && sample(rays).iter().all(|ray| frame.fits(ray))
-                && self.large.tries()
-                && self.load::<L>(frame, rays, first)
-            {
+            if self.packets::<L>(range.clone()) {
                 return;
             }
-            for (i, rays) in rays.chunks(RAYS).enumerate() {
-                self.packet::<L>(rays, first + i * RAYS);
+            for first in range.step_by(HALF * RAYS) {
+                let end = end.min(first + HALF * RAYS);
+                if self.mixed::<L>(first..end) {
+                    continue;
+                }
+                for first in (first..end).step_by(RAYS) {
+                    let end = end.min(first + RAYS);
+                    self.packet::<L>(&self.exact.rays[first..end], first);
+                }
             }
         }
     }
 
-    /// Answers up to 64 rays if they are alike.
+    /// Answers many packets of rays as one beam if all of them are alike.
+    ///
+    /// A few rays are looked at before any are put side by side, so that incoherent batches lose
+    /// next to nothing here.
+    #[inline(always)]
+    unsafe fn packets<L: BeamSimd>(&mut self, range: Range<usize>) -> bool {
+        let rays = &self.exact.rays[range.clone()];
+        if rays.len() <= FEWER[LARGE] * RAYS {
+            return false;
+        }
+        let Some(frame) = Frame::of(&rays[0]) else { return false };
+        sample(rays).iter().all(|ray| frame.fits(ray))
+            && self.patience[LARGE].tries()
+            // SAFETY: passed on to the caller.
+            && unsafe { self.load::<L>(frame, rays, range.start) }
+    }
+
+    /// Answers some packets of rays as one beam, or several that share packets, as where a silhouette passes between them;
+    /// false if they are not worth it.
+    #[inline(always)]
+    unsafe fn mixed<L: BeamSimd>(&mut self, range: Range<usize>) -> bool {
+        let rays = &self.exact.rays[range.clone()];
+        if rays.len() <= FEWER[MEDIUM] * RAYS {
+            return false;
+        }
+        let Some(frame) = Frame::of(&rays[0]) else { return false };
+        if !sample(rays).iter().any(|ray| frame.fits(ray)) || !self.patience[MEDIUM].tries() {
+            return false;
+        }
+        let (mut rest, mut left) = ([0; HALF], [0; HALF]);
+        let (count, mut any) = (rays.len().div_ceil(RAYS), false);
+        for (i, rays) in rays.chunks(RAYS).enumerate() {
+            self.room.packets[i].load(rays, (range.start + i * RAYS) as u32);
+            rest[i] = self.room.packets[i].lanes;
+        }
+        for _ in 0..LEADERS {
+            let Some(k) = rest.iter().position(|&rest| rest != 0) else { break };
+            let lane = rest[k].trailing_zeros();
+            let Some(frame) = Frame::of(&rays[k * RAYS + lane as usize]) else { break };
+            let (mut lanes, mut alike) = ([0; HALF], 0);
+            for (i, packet) in self.room.packets[..count].iter_mut().enumerate() {
+                packet.lanes = rest[i];
+                // SAFETY: passed on to the caller.
+                lanes[i] = unsafe { packet.like::<L::Rays>(&frame) };
+                packet.lanes = lanes[i];
+                alike += lanes[i].count_ones();
+            }
+            // SAFETY: passed on to the caller.
+            let cast = alike >= FEWEST_MIXED && unsafe { self.cast::<L>(frame, count) };
+            any |= cast;
+            lanes[k] |= 1 << lane;
+            for i in 0..count {
+                rest[i] &= !lanes[i];
+                if !cast {
+                    left[i] |= lanes[i];
+                }
+            }
+        }
+        for i in 0..count {
+            self.leave(range.start + i * RAYS, rest[i] | left[i]);
+        }
+        if !any {
+            self.patience[MEDIUM].learn(false);
+        }
+        true
+    }
+
+    /// Answers the rays of some packets if they are alike.
     #[inline(always)]
     unsafe fn load<L: BeamSimd>(&mut self, frame: Frame, rays: &[Ray], first: usize) -> bool {
+        // All are put side by side before any are looked at: vectors are not read while they are written number by number.
         for (i, rays) in rays.chunks(RAYS).enumerate() {
-            let packet = &mut self.room.packets[i];
-            packet.load(rays, (first + i * RAYS) as u32);
+            self.room.packets[i].load(rays, (first + i * RAYS) as u32);
+        }
+        for packet in &mut self.room.packets[..rays.len().div_ceil(RAYS)] {
             // SAFETY: passed on to the caller.
             if unsafe { packet.like::<L::Rays>(&frame) } != packet.lanes {
                 return false;
@@ -335,7 +454,7 @@ impl<Q: BeamQuery> Beams<'_, Q> {
     unsafe fn packet<L: BeamSimd>(&mut self, rays: &[Ray], first: usize) {
         let mut rest = (1u32 << rays.len()) - 1;
         let alike = |frame: Frame| sample(rays).iter().filter(|ray| frame.fits(ray)).count() > 1;
-        if Frame::of(&rays[0]).is_none_or(|frame| !alike(frame)) || !self.small.tries() {
+        if Frame::of(&rays[0]).is_none_or(|frame| !alike(frame)) || !self.patience[SMALL].tries() {
             return self.left.extend(first as u32..(first + rays.len()) as u32);
         }
         self.room.packets[0].load(rays, first as u32);
@@ -373,32 +492,50 @@ impl<Q: BeamQuery> Beams<'_, Q> {
         // SAFETY: passed on to the caller.
         unsafe {
             let packets = &mut self.room.packets[..count];
-            let Some(mut frame) = frame.fit::<L::Rays>(packets, self.tree.bounds()) else {
-                return false;
-            };
+            let fitted = frame.fit::<L::Rays>(packets, self.tree.bounds(), &mut self.met);
+            let Some(mut frame) = fitted else { return false };
             frame.place::<L::Rays>(packets);
             self.room.tested = Mailboxes::EMPTY;
-            let done = L::walk(self, &frame, 0..count);
-            let patience = if count > 1 { &mut self.large } else { &mut self.small };
-            patience.learn(done);
+            let done = self.divide::<L>(&frame, 0..count);
             for k in 0..count {
-                // What the packets have found and tested together stands.
-                let done = done || (count > 1 && self.alone::<L>(&frame, k));
-                self.finish::<L>(&frame, k, done);
+                self.finish::<L>(&frame, k, done >> k & 1 == 1);
             }
             true
         }
     }
 
-    /// Goes on with a packet of a beam that was too wide.
+    /// Walks the tree with some packets together, or where they are too wide with parts of them; returns the packets that
+    /// got to their end. What packets have found and tested together stands.
     #[inline(always)]
-    unsafe fn alone<L: BeamSimd>(&mut self, frame: &Frame, k: usize) -> bool {
-        if !self.small.tries() {
-            return false;
-        }
+    unsafe fn divide<L: BeamSimd>(&mut self, frame: &Frame, range: Range<usize>) -> u32 {
+        let size = size(range.len());
         // SAFETY: passed on to the caller.
-        let done = unsafe { L::walk(self, frame, k..k + 1) };
-        self.small.learn(done);
+        let all = unsafe { L::walk(self, frame, range.clone()) };
+        self.patience[size].learn(all);
+        if all {
+            return ((1 << range.len()) - 1) << range.start;
+        }
+        let mut done = 0;
+        for start in range.clone().step_by(FEWER[size].max(1)) {
+            let part = start..range.end.min(start + FEWER[size]);
+            if part.len() > 1 && self.patience[MEDIUM].tries() {
+                // SAFETY: passed on to the caller.
+                let all = unsafe { L::walk(self, frame, part.clone()) };
+                self.patience[MEDIUM].learn(all);
+                if all {
+                    done |= ((1 << part.len()) - 1) << part.start;
+                    continue;
+                }
+            }
+            for k in part {
+                if self.patience[SMALL].tries() {
+                    // SAFETY: passed on to the caller.
+                    let all = unsafe { L::walk(self, frame, k..k + 1) };
+                    self.patience[SMALL].learn(all);
+                    done |= u32::from(all) << k;
+                }
+            }
+        }
         done
     }
 
@@ -413,12 +550,13 @@ impl<Q: BeamQuery> Beams<'_, Q> {
             let mut radius = [0.0f32; 2];
             let (mut nearest, mut limit) = (f32::INFINITY, f32::NEG_INFINITY);
             let mut rays = 0;
-            for p in packets.iter_mut() {
+            for (k, p) in range.clone().zip(packets) {
                 for i in 0..2 {
                     radius[i] = radius[i].max(p.middle[i].abs() + p.radius[i]);
                 }
                 nearest = nearest.min(p.nearest);
                 p.farthest = farthest::<L::Rays>(p);
+                self.room.couples[k / 2].set(k % 2, p);
                 limit = limit.max(p.farthest);
                 rays += p.lanes.count_ones();
             }
@@ -431,7 +569,7 @@ impl<Q: BeamQuery> Beams<'_, Q> {
             if enter > exit {
                 return true;
             }
-            let end = self.spent() + u64::from(BUDGET * rays);
+            let end = self.spent() + u64::from(BUDGET[size(range.len())] * rays);
             let stack = &mut self.room.stack;
             (stack.code[1], stack.enter[1], stack.exit[1]) = (self.tree.root(), enter, exit);
             let mut sp = 1;
@@ -480,7 +618,7 @@ impl<Q: BeamQuery> Beams<'_, Q> {
         2 * self.report.steps + 4 * self.report.blocks + self.report.tests
     }
 
-    /// Tests a leaf; true if a ray has found something.
+    /// Tests a leaf; true if a ray may have found something.
     #[inline(always)]
     unsafe fn leaf<L: BeamSimd>(
         &mut self,
@@ -497,53 +635,99 @@ impl<Q: BeamQuery> Beams<'_, Q> {
                 let block = self.tree.lines().block(line);
                 self.room.facets.project::<L::Triangles>(frame, radius, block);
                 self.report.blocks += 1;
-                for k in range.clone() {
-                    if enter <= self.room.packets[k].farthest {
-                        found |= self.test::<L>(frame, block, line, k);
-                    }
+                let (mut clear, mut edge_on) = (0u64, 0u64);
+                for couple in range.start / 2..range.end.div_ceil(2) {
+                    let facing =
+                        self.room.facets.facing::<L::Rays>(&self.room.couples[couple], enter);
+                    clear |= u64::from(facing.clear) << (2 * WIDTH * couple);
+                    edge_on |= u64::from(facing.edge_on) << (2 * WIDTH * couple);
+                }
+                let of = !0u64 << (WIDTH * range.start) & !0u64 >> (64 - WIDTH * range.end);
+                let mut changed = self.test::<L>(frame, block, line, clear & of);
+                if edge_on & of != 0 {
+                    changed |= self.test_edge_on::<L>(frame, block, line, edge_on & of);
+                }
+                found |= changed != 0;
+                while changed != 0 {
+                    let k = changed.trailing_zeros() as usize;
+                    changed &= changed - 1;
+                    let packet = &mut self.room.packets[k];
+                    packet.farthest = farthest::<L::Rays>(packet);
+                    self.room.couples[k / 2].set_farthest(k % 2, packet);
                 }
             }
             found
         }
     }
 
-    /// Tests the block that is projected with packet `k`; true if a ray may have found something.
+    /// Tests triangles of the block that is projected with packets, [`WIDTH`] bits a packet; returns the packets that may have
+    /// found something.
+    ///
+    /// Most pairs of triangle and packet have nothing to do with each other. They are sorted out without a branch, which would
+    /// be guessed wrong every other time.
     #[inline(always)]
     unsafe fn test<L: BeamSimd>(
         &mut self,
         frame: &Frame,
         block: &Block,
         line: usize,
-        k: usize,
-    ) -> bool {
+        mut pairs: u64,
+    ) -> u32 {
         // SAFETY: passed on to the caller.
         unsafe {
-            let facing = self.room.facets.facing::<L::Triangles>(&self.room.packets[k]);
-            let (mut triangles, mut changed) = (facing.clear | facing.edge_on, 0);
-            while triangles != 0 {
-                let i = triangles.trailing_zeros() as usize;
-                triangles &= triangles - 1;
-                let prim_id = block.id[i] & ID_MASK;
-                if !self.room.tested.is_new(prim_id, k) {
+            let (mut touched, mut count) = ([0u8; PACKETS * WIDTH], 0);
+            while pairs != 0 {
+                let pair = pairs.trailing_zeros() as usize;
+                pairs &= pairs - 1;
+                let (k, i) = (pair / WIDTH, pair % WIDTH);
+                let is_new = self.room.tested.is_new(block.id[i] & ID_MASK, k);
+                let lanes = self.room.facets.touched::<L::Rays>(i, &self.room.packets[k]);
+                self.report.tests += u64::from(is_new);
+                touched[count] = pair as u8;
+                count += usize::from(is_new & (lanes != 0));
+            }
+            let mut changed = 0;
+            for &pair in &touched[..count] {
+                let (k, i) = (usize::from(pair) / WIDTH, usize::from(pair) % WIDTH);
+                let (facets, packet) = (&self.room.facets, &mut self.room.packets[k]);
+                let at = place(line, i);
+                let verdict = facets.test::<L::Rays, Q>(i, at, block.id[i] & ID_MASK, packet);
+                changed |= u32::from(verdict.hit | verdict.open != 0) << k;
+                if verdict.open != 0 {
+                    self.decide::<L>(frame, k, verdict.open, at);
+                }
+            }
+            changed
+        }
+    }
+
+    /// The same for triangles that may be seen edge-on.
+    #[inline(always)]
+    unsafe fn test_edge_on<L: BeamSimd>(
+        &mut self,
+        frame: &Frame,
+        block: &Block,
+        line: usize,
+        mut pairs: u64,
+    ) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            let mut changed = 0;
+            while pairs != 0 {
+                let pair = pairs.trailing_zeros() as usize;
+                pairs &= pairs - 1;
+                let (k, i) = (pair / WIDTH, pair % WIDTH);
+                if !self.room.tested.is_new(block.id[i] & ID_MASK, k) {
                     continue;
                 }
                 self.report.tests += 1;
-                let (facets, packet) = (&self.room.facets, &mut self.room.packets[k]);
-                let verdict = if facing.edge_on >> i & 1 == 0 {
-                    facets.test::<L::Rays, Q>(i, place(line, i), prim_id, packet)
-                } else {
-                    facets.test_edge_on::<L::Rays>(i, packet)
-                };
-                changed |= verdict.hit | verdict.open;
+                let verdict = self.room.facets.test_edge_on::<L::Rays>(i, &self.room.packets[k]);
+                changed |= u32::from(verdict.open != 0) << k;
                 if verdict.open != 0 {
                     self.decide::<L>(frame, k, verdict.open, place(line, i));
                 }
             }
-            if changed != 0 {
-                let packet = &mut self.room.packets[k];
-                packet.farthest = farthest::<L::Rays>(packet);
-            }
-            changed != 0
+            changed
         }
     }
 
@@ -572,7 +756,7 @@ impl<Q: BeamQuery> Beams<'_, Q> {
             while open != 0 {
                 let lane = open.trailing_zeros() as usize;
                 open &= open - 1;
-                if let Some(found) = self.exact.hit(packet.index[lane], at) {
+                if let Some(found) = self.exact.hit(packet.first + lane as u32, at) {
                     hit |= 1 << lane;
                     new.t[lane] = found.t;
                 }
@@ -595,7 +779,7 @@ impl<Q: BeamQuery> Beams<'_, Q> {
                         Some(best.t[lane])
                     } else {
                         let old = packet.found[lane].to_bits();
-                        self.exact.hit(packet.index[lane], old).map(|hit| hit.t)
+                        self.exact.hit(packet.first + lane as u32, old).map(|hit| hit.t)
                     };
                     let old = packet.prim[lane].to_bits();
                     if t_old.is_some_and(|t_old| t_old < t || (t_old == t && old <= prim_id)) {
@@ -616,13 +800,13 @@ impl<Q: BeamQuery> Beams<'_, Q> {
     #[inline(always)]
     unsafe fn finish<L: BeamSimd>(&mut self, frame: &Frame, k: usize, done: bool) {
         let packet = &self.room.packets[k];
-        let index = packet.index;
-        let mut denied;
+        let first = packet.first;
+        let denied;
         if Q::ANY {
             let state = |lane: usize| if packet.active >> lane & 1 == 1 { NONE } else { 0 };
             let found = std::array::from_fn(state);
             denied = if done { 0 } else { packet.active };
-            self.query.answer(&index, packet.lanes & !denied, &[0.0; RAYS], &found);
+            self.query.answer(first, packet.lanes & !denied, &[0.0; RAYS], &found);
         } else if done {
             let corners = &mut self.room.corners;
             // SAFETY: passed on to the caller.
@@ -631,15 +815,12 @@ impl<Q: BeamQuery> Beams<'_, Q> {
             let altered = wrong != 0 && self.exact.lines.is_shared();
             debug_assert!(wrong == 0 || altered, "f32 was certain of a hit that is none");
             denied = wrong;
-            self.query.answer(&index, packet.lanes & !denied, &t, &prim_id);
+            self.query.answer(first, packet.lanes & !denied, &t, &prim_id);
         } else {
             denied = packet.lanes;
         }
         self.report.beam_rays += u64::from((packet.lanes & !denied).count_ones());
-        while denied != 0 {
-            self.left.push(index[denied.trailing_zeros() as usize]);
-            denied &= denied - 1;
-        }
+        self.leave(first as usize, denied);
     }
 }
 

@@ -209,7 +209,7 @@ pub unsafe fn settle<L: BeamSimd>(
     while open != 0 {
         let lane = open.trailing_zeros() as usize;
         open &= open - 1;
-        match exact.hit(packet.index[lane], packet.found[lane].to_bits()) {
+        match exact.hit(packet.first + lane as u32, packet.found[lane].to_bits()) {
             Some(hit) => t[lane] = hit.t,
             None => denied |= 1 << lane,
         }
