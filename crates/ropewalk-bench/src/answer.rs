@@ -2,27 +2,42 @@
 
 pub use ropewalk_workload::{BenchHit, NO_PRIMITIVE};
 
-/// A list of hits for each ray, one list after the other.
+/// A list of hits for each ray, one list after the other, as arrays that an engine writes over: it is for none of them that memory is
+/// asked for anew in each call.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HitLists {
     /// Where the list of ray `i` starts; one more entry than rays.
-    pub offsets: Vec<u32>,
-    /// All hits.
-    pub hits: Vec<BenchHit>,
+    pub offsets: Vec<usize>,
+    /// Parameters of all hits.
+    pub t: Vec<f32>,
+    /// Primitives of all hits.
+    pub prim: Vec<u32>,
+}
+
+impl Default for HitLists {
+    fn default() -> Self {
+        HitLists::new()
+    }
 }
 
 impl HitLists {
-    /// No lists yet, with room for those of `rays` rays.
-    pub fn with_capacity(rays: usize) -> Self {
-        let mut offsets = Vec::with_capacity(rays + 1);
-        offsets.push(0);
-        HitLists { offsets, hits: Vec::with_capacity(4 * rays) }
+    /// No lists.
+    pub fn new() -> Self {
+        HitLists { offsets: vec![0], t: Vec::new(), prim: Vec::new() }
+    }
+
+    /// Removes all lists and keeps their memory.
+    pub fn clear(&mut self) {
+        self.offsets.truncate(1);
+        self.t.clear();
+        self.prim.clear();
     }
 
     /// Appends the list of the next ray.
     pub fn push(&mut self, hits: &[BenchHit]) {
-        self.hits.extend_from_slice(hits);
-        self.offsets.push(self.hits.len() as u32);
+        self.t.extend(hits.iter().map(|hit| hit.t));
+        self.prim.extend(hits.iter().map(|hit| hit.prim));
+        self.offsets.push(self.t.len());
     }
 
     /// Appends the list of the next ray from unordered hits: sorts them, drops repeated
@@ -35,8 +50,9 @@ impl HitLists {
     }
 
     /// The hits of a ray in order.
-    pub fn of(&self, ray: usize) -> &[BenchHit] {
-        &self.hits[self.offsets[ray] as usize..self.offsets[ray + 1] as usize]
+    pub fn of(&self, ray: usize) -> Vec<BenchHit> {
+        let range = self.offsets[ray]..self.offsets[ray + 1];
+        range.map(|i| BenchHit { t: self.t[i], prim: self.prim[i] }).collect()
     }
 
     /// Number of rays.

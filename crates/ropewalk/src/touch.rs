@@ -132,10 +132,67 @@ pub fn tie(a: f32, b: f32) -> bool {
     b <= a.next_up()
 }
 
+/// Where a parameter is followed by one that it may [`tie`] with, or nearly so, in increasing order. Many are looked at at once: nearly all lists
+/// have none.
+pub fn near_ties(t: &[f32]) -> impl Iterator<Item = usize> {
+    const CHUNK: usize = 64;
+    /// Numbers in order as integers; both zeros are one.
+    #[inline(always)]
+    fn rank(t: f32) -> u32 {
+        let bits = (t + 0.0).to_bits();
+        bits ^ (((bits as i32) >> 31) as u32 | 1 << 31)
+    }
+    // From the largest number below 0 to 0 it is two steps.
+    let near = |pair: &[f32]| rank(pair[1]).wrapping_sub(rank(pair[0])) <= 2;
+    (0..t.len().saturating_sub(1)).step_by(CHUNK).flat_map(move |start| {
+        let chunk = &t[start..t.len().min(start + CHUNK + 1)];
+        let any = chunk.windows(2).fold(false, |any, pair| any | near(pair));
+        let pairs = if any { chunk } else { &[] };
+        pairs
+            .windows(2)
+            .enumerate()
+            .filter(move |(_, pair)| near(pair))
+            .map(move |(i, _)| start + i)
+    })
+}
+
 /// The same in `f64`, where parameters of triangles at one edge are apart by no more than 2^-42 of their distance
 /// ([`Triangle`]).
 #[inline(always)]
 pub fn double_tie(a: f64, b: f64) -> bool {
     const SHARE: f64 = 1.0 / (1u64 << 38) as f64;
     b - a <= SHARE * a.abs().max(b.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every pair that ties is found, in lists longer than a chunk too, and few others.
+    #[test]
+    fn ties_are_found_wherever_they_stand() {
+        let up = |t: f32| t.next_up();
+        let kinds: [fn(f32) -> f32; 6] =
+            [|t| t, |t| t.next_up(), |t| 2.0 * t.abs() + 1.0, |t| -t, |_| -0.0, |t| t - 1.0];
+        for n in [0, 1, 2, 63, 64, 65, 66, 128, 129, 400] {
+            for seed in 0..40u32 {
+                let mut t = vec![[0.5f32, -0.0, -3.0, f32::MAX][seed as usize % 4]];
+                let mut state = seed;
+                while t.len() < n {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    // Mostly numbers that do not tie.
+                    let kind = if state >> 28 < 12 { 2 } else { (state >> 16) as usize % 6 };
+                    t.push(kinds[kind](*t.last().unwrap()).clamp(-1e30, 1e30));
+                }
+                t.truncate(n);
+                let found: Vec<usize> = near_ties(&t).collect();
+                let ties = |i: &usize| t[*i] <= t[i + 1] && tie(t[*i], t[i + 1]);
+                let wanted: Vec<usize> = (0..n.saturating_sub(1)).filter(ties).collect();
+                assert!(wanted.iter().all(|i| found.contains(i)), "{t:?}: {wanted:?}, {found:?}");
+                let near = |&i: &usize| t[i] <= t[i + 1] && t[i + 1] <= up(up(t[i]));
+                assert!(found.iter().all(near), "{t:?}: {found:?}");
+                assert!(found.is_sorted());
+            }
+        }
+    }
 }

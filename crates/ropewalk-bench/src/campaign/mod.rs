@@ -8,7 +8,7 @@ mod rays;
 
 pub use rays::{Aim, Marksman};
 
-use crate::answer::BenchHit;
+use crate::answer::{BenchHit, HitLists};
 use crate::harness::Engine;
 use crate::own::{TaB, Wave};
 use crate::scene::Mesh;
@@ -143,9 +143,10 @@ impl<'a> Campaign<'a> {
             });
             let ray = |random: &mut Random| Ray::new(point, random.direction().map(|x| x as f32));
             let rays: Vec<Ray> = (0..VOTES).map(|_| ray(&mut random)).collect();
-            let lists = self.walk.hits(&rays, usize::MAX);
+            let mut lists = HitLists::new();
+            self.walk.hits(&rays, usize::MAX, &mut lists);
             // A line through an edge hits two triangles in one place, which would count twice.
-            let mut places: Vec<_> = (0..VOTES).map(|i| lists.of(i).to_vec()).collect();
+            let mut places: Vec<_> = (0..VOTES).map(|i| lists.of(i)).collect();
             places.iter_mut().for_each(|hits| hits.dedup_by_key(|h| h.t));
             if places.iter().all(|hits| hits.len() % 2 == 1) {
                 found.push(point);
@@ -195,9 +196,10 @@ impl<'a> Campaign<'a> {
 
     /// All hits of each ray in the walk's arithmetic, `t` as bits; -0 is 0.
     fn every_hit(&self, rays: &[Ray]) -> Vec<Vec<(u32, u32)>> {
-        let lists = self.walk.hits(rays, usize::MAX);
+        let mut lists = HitLists::new();
+        self.walk.hits(rays, usize::MAX, &mut lists);
         let row = |ray: usize| {
-            let mut hits = lists.of(ray).to_vec();
+            let mut hits = lists.of(ray);
             hits.iter_mut().for_each(|h| h.t += 0.0);
             hits.sort_unstable_by(BenchHit::order);
             let hit = |h: &BenchHit| Hit { t: h.t, prim_id: h.prim, u: 0.0, v: 0.0 };

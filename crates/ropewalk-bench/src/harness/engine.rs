@@ -47,8 +47,8 @@ pub trait Engine: Sync {
         unreachable!("{} does not answer occlusion", self.name())
     }
 
-    /// The hits of each ray in order, none twice; at most `limit` of each.
-    fn hits(&self, _rays: &[Ray], _limit: usize) -> HitLists {
+    /// The hits of each ray in order, none twice; at most `limit` of each. Written over what `out` holds.
+    fn hits(&self, _rays: &[Ray], _limit: usize, _out: &mut HitLists) {
         unreachable!("{} does not answer all hits", self.name())
     }
 
@@ -108,7 +108,7 @@ impl Answers {
                 Answers::Closest(vec![BenchHit::MISS; work.rays.len()])
             }
             Question::Occluded => Answers::Occluded(vec![false; work.rays.len()]),
-            Question::AllHits | Question::FirstHits(_) => Answers::Hits(HitLists::with_capacity(0)),
+            Question::AllHits | Question::FirstHits(_) => Answers::Hits(HitLists::new()),
         }
     }
 
@@ -118,13 +118,13 @@ impl Answers {
             (Answers::Closest(out), Question::Closest) => engine.closest(&work.rays, out),
             (Answers::Closest(out), _) => engine.walk(&work.rays, &work.chains, out),
             (Answers::Occluded(out), _) => engine.occluded(&work.rays, out),
-            (Answers::Hits(out), Question::FirstHits(k)) => *out = engine.hits(&work.rays, k),
-            (Answers::Hits(out), _) => *out = engine.hits(&work.rays, usize::MAX),
+            (Answers::Hits(out), Question::FirstHits(k)) => engine.hits(&work.rays, k, out),
+            (Answers::Hits(out), _) => engine.hits(&work.rays, usize::MAX, out),
         }
     }
 
     /// The answer for one ray.
-    pub fn of(&self, ray: usize) -> Answer<'_> {
+    pub fn of(&self, ray: usize) -> Answer {
         match self {
             Answers::Closest(hits) => Answer::Closest(hits[ray]),
             Answers::Occluded(flags) => Answer::Occluded(flags[ray]),
@@ -134,12 +134,12 @@ impl Answers {
 }
 
 /// The answer for one ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Answer<'a> {
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
     /// Nearest hit.
     Closest(BenchHit),
     /// Occlusion.
     Occluded(bool),
     /// Hits in order.
-    Hits(&'a [BenchHit]),
+    Hits(Vec<BenchHit>),
 }

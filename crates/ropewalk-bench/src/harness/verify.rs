@@ -43,7 +43,7 @@ pub struct Testimony<'a> {
 
 impl Testimony<'_> {
     /// The answer to a ray of the whole workload, if it is in the subset.
-    fn on(&self, ray: usize) -> Option<Answer<'_>> {
+    fn on(&self, ray: usize) -> Option<Answer> {
         Workload::in_subset(ray, self.stride).map(|k| self.answers.of(k))
     }
 }
@@ -80,8 +80,8 @@ pub fn verify(oracle: &Oracle, faces: usize, work: &Workload, all: &[Testimony])
         let candidates = oracle.candidates(&work.rays[ray]);
         for (engine, count) in all.iter().zip(&mut counts) {
             let Some(given) = engine.on(ray) else { continue };
-            count.0 += weight * f64::from(!is_exact(given, work.kind.question(), &candidates));
-            count.1 += weight * f64::from(!is_right(given, work.kind.question(), &candidates));
+            count.0 += weight * f64::from(!is_exact(&given, work.kind.question(), &candidates));
+            count.1 += weight * f64::from(!is_right(&given, work.kind.question(), &candidates));
         }
     }
     let per_million = |count: f64, rays: usize| count * 1e6 / rays.max(1) as f64;
@@ -99,7 +99,7 @@ fn agree(a: &Answer, b: &Answer) -> bool {
         (Answer::Closest(a), Answer::Closest(b)) => same_place(a, b),
         (Answer::Occluded(a), Answer::Occluded(b)) => a == b,
         (Answer::Hits(a), Answer::Hits(b)) => {
-            a.len() == b.len() && a.iter().zip(*b).all(|(a, b)| same_place(a, b))
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same_place(a, b))
         }
         _ => false,
     }
@@ -112,15 +112,15 @@ fn same_place(a: &BenchHit, b: &BenchHit) -> bool {
 }
 
 /// Whether an answer is what `f64` gives, up to the rounding of `t`.
-fn is_exact(given: Answer, question: Question, candidates: &[Candidate]) -> bool {
+fn is_exact(given: &Answer, question: Question, candidates: &[Candidate]) -> bool {
     let hits = || candidates.iter().filter(|c| c.exact);
     let near = |hit: &BenchHit, c: &Candidate| (f64::from(hit.t) - c.t).abs() <= c.t_error;
     match given {
         Answer::Closest(hit) => match hits().next() {
             None => !hit.is_hit(),
-            Some(first) => hit.is_hit() && near(&hit, first),
+            Some(first) => hit.is_hit() && near(hit, first),
         },
-        Answer::Occluded(flag) => flag == hits().next().is_some(),
+        Answer::Occluded(flag) => *flag == hits().next().is_some(),
         Answer::Hits(list) => {
             let wanted = hits().count().min(limit(question));
             list.len() == wanted && list.iter().zip(hits()).all(|(hit, c)| near(hit, c))
@@ -129,7 +129,7 @@ fn is_exact(given: Answer, question: Question, candidates: &[Candidate]) -> bool
 }
 
 /// Whether an answer is possible within the error bound.
-fn is_right(given: Answer, question: Question, candidates: &[Candidate]) -> bool {
+fn is_right(given: &Answer, question: Question, candidates: &[Candidate]) -> bool {
     let certain = || candidates.iter().filter(|c| c.certain);
     let found = |hit: &BenchHit| {
         candidates
@@ -140,7 +140,7 @@ fn is_right(given: Answer, question: Question, candidates: &[Candidate]) -> bool
     match given {
         Answer::Closest(hit) if !hit.is_hit() => certain().next().is_none(),
         Answer::Closest(hit) => {
-            found(&hit).is_some_and(|c| !certain().any(|n| n.t + n.t_error < c.t - c.t_error))
+            found(hit).is_some_and(|c| !certain().any(|n| n.t + n.t_error < c.t - c.t_error))
         }
         Answer::Occluded(true) => !candidates.is_empty(),
         Answer::Occluded(false) => certain().next().is_none(),
@@ -195,7 +195,7 @@ mod tests {
         match work.kind.question() {
             Question::Occluded => Answers::Occluded(lists.map(|l| !l.is_empty()).collect()),
             Question::AllHits | Question::FirstHits(_) => {
-                let mut out = HitLists::with_capacity(0);
+                let mut out = HitLists::new();
                 lists.for_each(|l| out.push(&l[..l.len().min(limit(work.kind.question()))]));
                 Answers::Hits(out)
             }
@@ -218,8 +218,8 @@ mod tests {
                 Answers::Closest(hits) => hits[victim].t += 1.0,
                 Answers::Occluded(flags) => flags[victim] = !flags[victim],
                 Answers::Hits(lists) => {
-                    lists.hits[lists.offsets[victim] as usize].prim ^= 1;
-                    lists.hits[lists.offsets[victim] as usize].t += 0.1;
+                    lists.prim[lists.offsets[victim]] ^= 1;
+                    lists.t[lists.offsets[victim]] += 0.1;
                 }
             }
             let testimony = |answers| Testimony { answers, stride: 1 };
@@ -250,7 +250,7 @@ mod tests {
         let ray = Ray::new([0.7, 0.2, 1.0], [0.0, 0.0, -1.0]);
         let candidates = Oracle::new(&mesh).candidates(&ray);
         let list = Oracle::new(&mesh).exact(&ray);
-        let ok = |l: &[BenchHit], q| is_right(Answer::Hits(l), q, &candidates);
+        let ok = |l: &[BenchHit], q| is_right(&Answer::Hits(l.to_vec()), q, &candidates);
         assert!(list.len() == 3 && ok(&list, Question::AllHits));
         assert!(!ok(&[list[0], list[0], list[1], list[2]], Question::AllHits));
         assert!(!ok(&[list[0], list[2]], Question::AllHits));

@@ -36,12 +36,11 @@ impl TaB {
         ta_b::<Q, _>(&self.geometry, &self.tree, ray, &mut NoCounts)
     }
 
-    fn lists<const K: usize>(&self, rays: &[Ray]) -> HitLists {
-        let mut lists = HitLists::with_capacity(rays.len());
+    fn lists<const K: usize>(&self, rays: &[Ray], out: &mut HitLists) {
+        out.clear();
         for ray in rays {
-            lists.push_unordered(&mut self.ask::<FirstHits<K>>(ray), K);
+            out.push_unordered(&mut self.ask::<FirstHits<K>>(ray), K);
         }
-        lists
     }
 }
 
@@ -118,12 +117,12 @@ impl Engine for TaB {
         }
     }
 
-    fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
+    fn hits(&self, rays: &[Ray], limit: usize, out: &mut HitLists) {
         if limit == FIRST_HITS {
-            self.lists::<FIRST_HITS>(rays)
+            self.lists::<FIRST_HITS>(rays, out)
         } else {
             debug_assert_eq!(limit, usize::MAX);
-            self.lists::<{ usize::MAX }>(rays)
+            self.lists::<{ usize::MAX }>(rays, out)
         }
     }
 }

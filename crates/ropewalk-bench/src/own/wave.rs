@@ -116,16 +116,11 @@ impl Engine for Wave {
         self.caster().occluded_into(rays, out);
     }
 
-    fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
-        thread_local! {
-            static ALL: RefCell<AllHits> = RefCell::default();
-        }
-        ALL.with_borrow_mut(|all| {
-            self.caster().first_hits_into(rays, limit, all);
-            let hits = all.t.iter().zip(&all.prim_id).map(|(&t, &prim)| BenchHit { t, prim });
-            let offsets = all.offsets.iter().map(|&o| o as u32).collect();
-            HitLists { offsets, hits: hits.collect() }
-        })
+    fn hits(&self, rays: &[Ray], limit: usize, out: &mut HitLists) {
+        let HitLists { offsets, t, prim } = std::mem::take(out);
+        let mut all = AllHits { offsets, t, prim_id: prim };
+        self.caster().first_hits_into(rays, limit, &mut all);
+        *out = HitLists { offsets: all.offsets, t: all.t, prim: all.prim_id };
     }
 }
 

@@ -118,17 +118,17 @@ impl Engine for BvhPeer {
         }
     }
 
-    fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
-        let (mut lists, mut found) = (HitLists::with_capacity(rays.len()), Vec::new());
+    fn hits(&self, rays: &[Ray], limit: usize, out: &mut HitLists) {
+        out.clear();
+        let mut found = Vec::new();
         for ray in rays {
             let query = convert(ray);
             let leaves = self.tree.traverse_iterator(&query, &self.shapes);
             found.extend(leaves.filter_map(|shape| {
                 shape.intersect(ray).map(|t| BenchHit { t, prim: shape.prim })
             }));
-            lists.push_unordered(&mut found, limit);
+            out.push_unordered(&mut found, limit);
         }
-        lists
     }
 }
 

@@ -528,7 +528,7 @@ impl Engine for EmbreeEngine {
         }
     }
 
-    fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
+    fn hits(&self, rays: &[Ray], limit: usize, out: &mut HitLists) {
         let api = &self.scene.embree.api;
         let mut found = Vec::new();
         let mut context =
@@ -536,15 +536,14 @@ impl Engine for EmbreeEngine {
         let mut arguments = Arguments::new(QUERY_INVOKE_ARGUMENT_FILTER);
         arguments.context = &raw mut context;
         arguments.filter = Some(if limit == usize::MAX { collect_all } else { collect_first });
-        let mut lists = HitLists::with_capacity(rays.len());
+        out.clear();
         for ray in rays {
             let mut r = RayHit::new(ray);
             self.scene.call(api.rtcIntersect1, &mut r, &mut arguments);
             // SAFETY: the call is over, so nobody else refers to the list; the pointer is the one
             // that the context holds.
-            lists.push_unordered(unsafe { &mut *context.found }, limit);
+            out.push_unordered(unsafe { &mut *context.found }, limit);
         }
-        lists
     }
 }
 

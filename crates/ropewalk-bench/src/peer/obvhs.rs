@@ -91,8 +91,9 @@ impl Engine for ObvhsPeer {
         }
     }
 
-    fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
-        let (mut lists, mut found) = (HitLists::with_capacity(rays.len()), Vec::new());
+    fn hits(&self, rays: &[Ray], limit: usize, out: &mut HitLists) {
+        out.clear();
+        let mut found = Vec::new();
         for ray in rays {
             self.tree.ray_traverse_anyhit(convert(ray), |r, id| {
                 let t = self.triangles[id].intersect(r);
@@ -100,9 +101,8 @@ impl Engine for ObvhsPeer {
                     found.push(BenchHit { t, prim: self.tree.primitive_indices[id] });
                 }
             });
-            lists.push_unordered(&mut found, limit);
+            out.push_unordered(&mut found, limit);
         }
-        lists
     }
 }
 

@@ -59,8 +59,9 @@ impl Engine for ParryPeer {
         }
     }
 
-    fn hits(&self, rays: &[Ray], limit: usize) -> HitLists {
-        let (mut lists, mut found) = (HitLists::with_capacity(rays.len()), Vec::new());
+    fn hits(&self, rays: &[Ray], limit: usize, out: &mut HitLists) {
+        out.clear();
+        let mut found = Vec::new();
         for ray in rays {
             let (query, end) = (convert(ray), end(ray));
             for prim in self.0.bvh().leaves(|node| node.cast_ray(&query, end) < f32::MAX) {
@@ -69,9 +70,8 @@ impl Engine for ParryPeer {
                     found.push(BenchHit { t, prim });
                 }
             }
-            lists.push_unordered(&mut found, limit);
+            out.push_unordered(&mut found, limit);
         }
-        lists
     }
 }
 

@@ -27,8 +27,10 @@ use crate::geometry::Geometry;
 use crate::point::Cell;
 use crate::point::cells::locate;
 use crate::ray::{Hit, PreparedRay, Ray};
+use crate::touch;
 use crate::wide::WideTree;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rays that one task of a parallel batch traces.
 pub const TASK: usize = 4096;
@@ -247,10 +249,29 @@ impl<'a> Engine<'a> {
             }
             Some((i, hits))
         };
+        let settle_all = |rays: Range<usize>| {
+            let first = all.offsets[rays.start];
+            let (mut changed, mut next) = (Vec::new(), rays.start);
+            for tie in touch::near_ties(&all.t[first..all.offsets[rays.end]]) {
+                let at = first + tie;
+                if at < all.offsets[next] {
+                    continue;
+                }
+                let ray = next + all.offsets[next + 1..=rays.end].partition_point(|&end| end <= at);
+                // Between the hits of two rays there is nothing to settle.
+                if at + 1 < all.offsets[ray + 1] {
+                    changed.extend(settle(ray));
+                    next = ray + 1;
+                }
+            }
+            changed
+        };
         let changed: Vec<(usize, Vec<Hit>)> = if self.is_serial(rays) {
-            (0..rays.len()).filter_map(settle).collect()
+            settle_all(0..rays.len())
         } else {
-            (0..rays.len()).into_par_iter().with_min_len(TASK).filter_map(settle).collect()
+            let tasks: Vec<_> = (0..rays.len()).step_by(TASK).collect();
+            let task = |&start: &usize| settle_all(start..rays.len().min(start + TASK));
+            tasks.par_iter().flat_map_iter(task).collect()
         };
         if changed.is_empty() {
             return;
