@@ -48,7 +48,9 @@ def primary(eye, at, angle):
     u, v = half * ((2 * x + 1) / SIDE - 1), half * (1 - (2 * y + 1) / SIDE)
     directions = forward + u[:, None] * right + v[:, None] * up
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    return np.float32(np.broadcast_to(eye, directions.shape)), np.float32(directions)
+    # In rows, as all engines want them: a broadcast array is copied column by column.
+    origins = np.ascontiguousarray(np.broadcast_to(eye, directions.shape), np.float32)
+    return origins, np.ascontiguousarray(directions, np.float32)
 
 
 def diffuse(scene, rays, rng):
