@@ -125,6 +125,9 @@ impl Reflection {
 
     /// The mean of [`Reflection::dielectric`] over directions.
     pub fn dielectric_mean(&self, f0: f32, roughness: f32) -> f32 {
+        if f0 == 0.0 {
+            return 0.0;
+        }
         if roughness < LEAST_ROUGHNESS {
             return f0 + (fresnel::at_grazing(f0) - f0) / 21.0;
         }

@@ -9,6 +9,10 @@ use super::{fresnel, ggx};
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, TAU};
 
+/// The least reflectance at normal incidence of a coat: below it a coat reflects less than 2^-20 at any angle
+/// ([`fresnel::at_grazing`]), which changes no digit that is shown, and the surface is matte.
+const LEAST_COAT: f32 = 1.0 / (1 << 26) as f32;
+
 /// A surface at a point; the three shares add up to 1.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bsdf<'a> {
@@ -78,8 +82,10 @@ impl Bsdf<'_> {
         if self.outside { self.ior } else { 1.0 / self.ior }
     }
 
+    /// What the coat reflects at normal incidence; 0 for one that is not worth following.
     fn coat_f0(&self) -> f32 {
-        fresnel::normal_incidence(self.ior)
+        let f0 = fresnel::normal_incidence(self.ior);
+        if f0 < LEAST_COAT { 0.0 } else { f0 }
     }
 
     /// True if light can be scattered from more than single directions, so that lights are worth sampling.

@@ -125,13 +125,32 @@ impl Environment {
     }
 
     /// Radiance that comes from a direction.
-    pub(crate) fn radiance(&self, direction: Vec3) -> Vec3 {
-        let [u, v] = place(direction);
+    #[cfg(test)]
+    fn radiance(&self, direction: Vec3) -> Vec3 {
+        self.radiance_at(place(direction))
+    }
+
+    /// Radiance that comes from a direction, and the density of [`Environment::sample`] there by solid angle.
+    pub(crate) fn radiance_and_density(&self, direction: Vec3) -> (Vec3, f32) {
+        let at = place(direction);
+        (self.radiance_at(at), self.density_at(at, direction.truncate().length()))
+    }
+
+    /// Radiance from a place in the picture, 0 to 1 across and down.
+    fn radiance_at(&self, [u, v]: [f32; 2]) -> Vec3 {
         let (x, y) = (u * self.width as f32 - 0.5, v * self.height as f32 - 0.5);
         let (w, h) = (i64::from(self.width), i64::from(self.height));
         let (column, row) = (x.floor() as i64, y.floor() as i64);
         let at = |column: i64, row: i64| {
-            let (column, row) = (column.rem_euclid(w), row.clamp(0, h - 1));
+            // From one before the first to one behind the last.
+            let column = if column < 0 {
+                w - 1
+            } else if column >= w {
+                0
+            } else {
+                column
+            };
+            let row = row.clamp(0, h - 1);
             self.radiance[(row * w + column) as usize]
         };
         let across = x - column as f32;
@@ -139,23 +158,24 @@ impl Environment {
         along(row).lerp(along(row + 1), y - row as f32)
     }
 
-    /// A direction by the radiance from there, and its density; `None` if nothing shines.
-    pub(crate) fn sample(&self, u: [f32; 2]) -> Option<(Vec3, f32)> {
+    /// A direction by the radiance from there, that radiance, and the direction's density; `None` if nothing shines.
+    pub(crate) fn sample(&self, u: [f32; 2]) -> Option<(Vec3, Vec3, f32)> {
         if self.table.is_empty() {
             return None;
         }
         let ([x, y], density) = self.table.sample(u);
-        let (phi, theta) = (TAU * x, PI * y);
-        let direction = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
-        Some((direction, by_solid_angle(density, theta.sin())))
+        let ((sin_phi, cos_phi), (sin_theta, cos_theta)) =
+            ((TAU * x).sin_cos(), (PI * y).sin_cos());
+        let direction = Vec3::new(sin_theta * cos_phi, sin_theta * sin_phi, cos_theta);
+        Some((direction, self.radiance_at([x, y]), by_solid_angle(density, sin_theta)))
     }
 
-    /// The density of [`Environment::sample`] by solid angle.
-    pub(crate) fn density(&self, direction: Vec3) -> f32 {
+    /// The density of [`Environment::sample`] by solid angle, at a place whose angle to the zenith has this sine.
+    fn density_at(&self, place: [f32; 2], sine: f32) -> f32 {
         if self.table.is_empty() {
             return 0.0;
         }
-        by_solid_angle(self.table.density(place(direction)), direction.truncate().length())
+        by_solid_angle(self.table.density(place), sine)
     }
 
     /// The integral of the luminance over all directions that are sampled.
@@ -190,9 +210,11 @@ mod tests {
         for i in 0..n {
             for j in 0..n {
                 let at = |k: i32| (k as f32 + 0.5) / n as f32;
-                let (direction, density) = map.sample([at(i), at(j)]).expect("bright");
-                assert!((map.density(direction) / density - 1.0).abs() < 0.02 || density < 1e-3);
-                total += f64::from(map.radiance(direction).x / density);
+                let (direction, radiance, density) = map.sample([at(i), at(j)]).expect("bright");
+                let (met, met_density) = map.radiance_and_density(direction);
+                assert!((met - radiance).length() < 1e-2 * radiance.length(), "{met} {radiance}");
+                assert!((met_density / density - 1.0).abs() < 0.02 || density < 1e-3);
+                total += f64::from(radiance.x / density);
                 let (z, phi) = (1.0 - 2.0 * at(i), TAU * at(j));
                 let r = (1.0 - z * z).sqrt();
                 even += f64::from(map.radiance(Vec3::new(r * phi.cos(), r * phi.sin(), z)).x);

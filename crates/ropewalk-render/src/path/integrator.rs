@@ -316,12 +316,10 @@ impl Integrator<'_> {
     fn beyond_surfaces(&self, path: &Path, direction: Vec3) -> Vec3 {
         let lights = self.world.lights();
         let mut sum = Vec3::ZERO;
-        let sky = self.world.sky_radiance(direction);
+        let (sky, by_sky) = self.world.sky(direction);
         if sky != Vec3::ZERO {
-            let density = |place: &Place| {
-                let by_sky = self.world.sky_density(direction);
-                lights.environment_density(&self.chooser(), place, by_sky)
-            };
+            let density =
+                |place: &Place| lights.environment_density(&self.chooser(), place, by_sky);
             sum += sky * self.weight_of_bsdf(path, density);
         }
         if let Some(sun) = self.world.sun() {

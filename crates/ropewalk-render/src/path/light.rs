@@ -177,13 +177,17 @@ impl Lights {
         }
     }
 
-    /// The sum of the weights of far and near lights, and how many of them are not zero.
-    fn weights(&self, chooser: &Chooser<'_>, place: &Place) -> (f32, f32) {
+    /// The weight of the near lights, the sum of the weights of far and near lights, and how many of them are not zero.
+    fn weights(&self, chooser: &Chooser<'_>, place: &Place) -> (f32, f32, f32) {
+        // Beside nothing else the weight does not matter.
+        let alone = self.near == self.len();
+        let near = if alone { 1.0 } else { self.tree.importance(place) };
+        let start = (near, if near > 0.0 { 1.0 } else { 0.0 });
         let far = (self.near..self.len()).map(|i| self.weight_of_far(i, chooser, place));
-        let near = std::iter::once(self.tree.importance(place));
-        near.chain(far).fold((0.0, 0.0), |(sum, count), weight| {
+        let (sum, count) = far.fold(start, |(sum, count), weight| {
             (sum + weight, if weight > 0.0 { count + 1.0 } else { count })
-        })
+        });
+        (near, sum, count)
     }
 
     /// A light for a number in `0..1`, and its probability.
@@ -192,7 +196,7 @@ impl Lights {
             let (index, _) = self.table.sample(u as f32);
             return Some((index, self.table.probability(index)));
         }
-        let (sum, count) = self.weights(chooser, place);
+        let (near, sum, count) = self.weights(chooser, place);
         let mut rest = u;
         for index in self.near..self.len() {
             let share = even_share(self.weight_of_far(index, chooser, place), sum, count);
@@ -201,7 +205,7 @@ impl Lights {
             }
             rest -= f64::from(share);
         }
-        let share = even_share(self.tree.importance(place), sum, count);
+        let share = even_share(near, sum, count);
         let inside = (rest / f64::from(share)).clamp(0.0, 1.0 - f64::EPSILON);
         let (index, probability) = self.tree.sample(place, inside)?;
         (share > 0.0).then_some((index, share * probability))
@@ -212,11 +216,11 @@ impl Lights {
         if chooser.choice == LightChoice::Power {
             return self.table.probability(index);
         }
-        let (sum, count) = self.weights(chooser, place);
+        let (near, sum, count) = self.weights(chooser, place);
         if index >= self.near {
             return even_share(self.weight_of_far(index, chooser, place), sum, count);
         }
-        let share = even_share(self.tree.importance(place), sum, count);
+        let share = even_share(near, sum, count);
         share * self.tree.probability(index, place)
     }
 
@@ -264,9 +268,8 @@ impl Lights {
                 })
             }
             Emitter::Environment => {
-                let (direction, density) = world.environment()?.sample(place)?;
-                let direction = world.sky_to_world(direction);
-                Some(far(direction, world.sky_radiance(direction), density))
+                let (direction, radiance, density) = world.environment()?.sample(place)?;
+                Some(far(world.sky_to_world(direction), radiance, density))
             }
             Emitter::Sun => {
                 let sun = world.sun()?;

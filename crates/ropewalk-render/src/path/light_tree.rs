@@ -56,30 +56,18 @@ impl LightBounds {
         0.5 * (self.low + self.high)
     }
 
-    /// An estimate of the irradiance by these lights, without what is in their way; 0 only where they give none.
-    pub fn importance(&self, place: &Place) -> f32 {
-        let way = self.center() - place.point;
-        let radius2 = 0.25 * (self.high - self.low).length_squared();
-        let distance2 = way.length_squared();
-        let nearest2 = distance2.max(radius2);
-        if nearest2 <= 0.0 {
-            return self.intensity;
+    /// What the walk needs of them.
+    fn glow(&self) -> Glow {
+        let (sine, cosine) = self.spread.sin_cos();
+        Glow {
+            center: self.center(),
+            radius2: 0.25 * (self.high - self.low).length_squared(),
+            axis: self.axis,
+            intensity: self.intensity,
+            // Pi itself has a sine below 0 in `f32`.
+            spread: Angle { cosine, sine: sine.max(0.0) },
+            two_sided: self.two_sided,
         }
-        if distance2 <= radius2 {
-            return self.intensity / nearest2;
-        }
-        let towards = way / distance2.sqrt();
-        // Half of the angle that the sphere around the box fills, widened by more than rounding.
-        let uncertain = (radius2 / distance2).sqrt().min(1.0).asin() + 1e-3;
-        let bounded = |cosine: f32, spread: f32| {
-            let angle = (cosine.clamp(-1.0, 1.0).acos() - spread - uncertain).max(0.0);
-            if angle < FRAC_PI_2 { angle.cos() } else { 0.0 }
-        };
-        let cosine = -towards.dot(self.axis);
-        let leaving = bounded(if self.two_sided { cosine.abs() } else { cosine }, self.spread);
-        let arriving =
-            if place.normal == Vec3::ZERO { 1.0 } else { bounded(place.normal.dot(towards), 0.0) };
-        self.intensity * leaving * arriving / nearest2
     }
 
     /// What the build weighs a side of a split by: intensity, surface and solid angle.
@@ -90,6 +78,80 @@ impl LightBounds {
         let (s, c) = (self.spread.sin(), self.spread.cos());
         let rim = 2.0 * edge * s - (self.spread - 2.0 * edge).cos() - 2.0 * self.spread * s + c;
         self.intensity * surface * (2.0 * PI * (1.0 - c) + FRAC_PI_2 * rim)
+    }
+}
+
+/// Bounds of lights with what each visit would compute anew.
+#[derive(Clone, Copy, Debug)]
+struct Glow {
+    /// Middle of the box, and the square of the radius of the sphere around it.
+    center: Vec3,
+    radius2: f32,
+    axis: Vec3,
+    intensity: f32,
+    spread: Angle,
+    two_sided: bool,
+}
+
+impl Glow {
+    /// An estimate of the irradiance by these lights, without what is in their way; 0 only where they give none.
+    fn importance(&self, place: &Place) -> f32 {
+        let way = self.center - place.point;
+        let radius2 = self.radius2;
+        let distance2 = way.length_squared();
+        let nearest2 = distance2.max(radius2);
+        if nearest2 <= 0.0 {
+            return self.intensity;
+        }
+        if distance2 <= radius2 {
+            return self.intensity / nearest2;
+        }
+        let towards = way / distance2.sqrt();
+        // Half of the angle that the sphere around the box fills, widened by more than rounding: the arcsine rises by
+        // at least as much as its argument.
+        let uncertain = Angle::of_sine((radius2 / distance2).sqrt() + 1e-3);
+        let cosine = -towards.dot(self.axis);
+        let leaving = Angle::of_cosine(if self.two_sided { cosine.abs() } else { cosine })
+            .less(self.spread)
+            .less(uncertain);
+        let arriving = if place.normal == Vec3::ZERO {
+            1.0
+        } else {
+            Angle::of_cosine(place.normal.dot(towards)).less(uncertain).cosine
+        };
+        self.intensity * leaving.cosine.max(0.0) * arriving.max(0.0) / nearest2
+    }
+}
+
+/// An angle from 0 to pi by its cosine and sine, so that angles are taken from each other without inverse functions
+/// (as in pbrt-v4's `LightBounds`).
+#[derive(Clone, Copy, Debug)]
+struct Angle {
+    cosine: f32,
+    sine: f32,
+}
+
+impl Angle {
+    fn of_cosine(cosine: f32) -> Angle {
+        let cosine = cosine.clamp(-1.0, 1.0);
+        Angle { cosine, sine: (1.0 - cosine * cosine).sqrt() }
+    }
+
+    /// At most a right angle.
+    fn of_sine(sine: f32) -> Angle {
+        let sine = sine.clamp(0.0, 1.0);
+        Angle { cosine: (1.0 - sine * sine).sqrt(), sine }
+    }
+
+    /// The difference to a smaller angle; 0 if the other is not smaller.
+    fn less(self, other: Angle) -> Angle {
+        if self.cosine >= other.cosine {
+            return Angle { cosine: 1.0, sine: 0.0 };
+        }
+        Angle {
+            cosine: self.cosine * other.cosine + self.sine * other.sine,
+            sine: (self.sine * other.cosine - self.cosine * other.sine).max(0.0),
+        }
     }
 }
 
@@ -111,7 +173,7 @@ fn cone_of_both(a: (Vec3, f32), b: (Vec3, f32)) -> (Vec3, f32) {
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    bounds: LightBounds,
+    glow: Glow,
     parent: u32,
     /// Both children, or `NONE` and the light.
     below: [u32; 2],
@@ -140,7 +202,7 @@ impl LightTree {
         let at = self.nodes.len() as u32;
         let first = lights[part[0] as usize];
         let bounds = part[1..].iter().fold(first, |all, &i| all.with(&lights[i as usize]));
-        self.nodes.push(Node { bounds, parent, below: [NONE, part[0]] });
+        self.nodes.push(Node { glow: bounds.glow(), parent, below: [NONE, part[0]] });
         if part.len() == 1 {
             self.leaves[part[0] as usize] = at;
             return at;
@@ -155,7 +217,7 @@ impl LightTree {
 
     /// The importance of all lights together.
     pub fn importance(&self, place: &Place) -> f32 {
-        self.nodes.first().map_or(0.0, |root| root.bounds.importance(place))
+        self.nodes.first().map_or(0.0, |root| root.glow.importance(place))
     }
 
     /// A light for a number in `0..1`, and its probability; `None` where no light arrives.
@@ -194,7 +256,7 @@ impl LightTree {
 
     /// The share of an inner node's first child; `None` if nothing comes from either.
     fn share_of_left(&self, node: &Node, place: &Place) -> Option<f32> {
-        let [a, b] = node.below.map(|i| self.nodes[i as usize].bounds.importance(place));
+        let [a, b] = node.below.map(|i| self.nodes[i as usize].glow.importance(place));
         (a + b > 0.0).then(|| a / (a + b))
     }
 }
@@ -299,6 +361,40 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// The importance without inverse functions is what the angles say.
+    #[test]
+    fn cosines_say_what_angles_say() {
+        let lights = lights(60);
+        let (mut dark, mut lit) = (0, 0);
+        for k in 0..2000u32 {
+            let light = &lights[k as usize % 60];
+            let light = light.with(&lights[(k as usize * 7 + 1) % 60]);
+            let normal = if k % 4 == 0 { Vec3::ZERO } else { unit(k) };
+            let place = Place { point: 9.0 * unit(30_000 + k), normal };
+            let glow = light.glow();
+            let way = light.center() - place.point;
+            let (distance2, radius2) = (way.length_squared(), glow.radius2);
+            if distance2 <= radius2 {
+                continue;
+            }
+            let uncertain = ((radius2 / distance2).sqrt() + 1e-3).min(1.0).asin();
+            let bounded = |cosine: f32, spread: f32| {
+                (cosine.acos() - spread).max(0.0).max(uncertain) - uncertain
+            };
+            let cosine = -way.normalize().dot(light.axis);
+            let cosine = if light.two_sided { cosine.abs() } else { cosine };
+            let leaving = bounded(cosine, light.spread).cos().max(0.0);
+            let facing = bounded(normal.dot(way.normalize()), 0.0).cos().max(0.0);
+            let arriving = if normal == Vec3::ZERO { 1.0 } else { facing };
+            let expected = light.intensity * leaving * arriving / distance2;
+            let found = glow.importance(&place);
+            let scale = light.intensity / distance2;
+            assert!((found - expected).abs() < 1e-3 * scale, "{k}: {found} {expected}");
+            if found > 0.0 { lit += 1 } else { dark += 1 }
+        }
+        assert!(dark > 50 && lit > 500, "{dark} {lit}");
     }
 
     /// Where a light reaches a point, no node above it says that none does.

@@ -92,7 +92,7 @@ fn rays_of(world: &World, cell: u32, ray: u32, low: Vec3, size: Vec3) -> [Ray; 2
     let origin = low + (corner + inside) * size / CELLS as f32;
     let up = world.sky_to_world(Vec3::Z);
     let sky = world.environment().and_then(|map| map.sample([number(3), number(4)]));
-    let sky = sky.map_or(up, |(direction, _)| world.sky_to_world(direction));
+    let sky = sky.map_or(up, |(direction, ..)| world.sky_to_world(direction));
     let sun = world.sun().map_or(up, |sun| sun.towards);
     [sky, sun].map(|direction| Ray::new(origin.to_array(), direction.to_array()))
 }

@@ -77,6 +77,8 @@ pub struct World {
     /// Luminance that each material sends out, the mean of its texture.
     shine: Vec<f32>,
     has_cutouts: bool,
+    /// Whether corners have coordinates, normals or colours, so that it matters where a face is met.
+    varies: bool,
     environment: Option<Environment>,
     sun: Option<Sun>,
     /// Rows: the axes of the sky in the world.
@@ -144,6 +146,7 @@ impl World {
         let glass = glass_tables(&stage.materials);
         let shine = shine(&stage);
         let has_cutouts = stage.materials.iter().any(|m| m.alpha != Alpha::Opaque);
+        let varies = !(stage.uvs.is_empty() && stage.normals.is_empty() && stage.colors.is_empty());
         let (environment, has_sun) = match &surroundings.backdrop {
             Backdrop::None => (None, false),
             Backdrop::Sky => (Some(Environment::sky(surroundings.ground)), true),
@@ -165,6 +168,7 @@ impl World {
             glass,
             shine,
             has_cutouts,
+            varies,
             environment,
             sun: has_sun.then(|| Sun::new(Vec3::Z, SUN)),
             sky_axes: [Vec3::X, Vec3::Y, Vec3::Z],
@@ -235,14 +239,11 @@ impl World {
         Vec3::new(d.dot(x), d.dot(y), d.dot(z))
     }
 
-    /// Radiance of the environment from a direction, without the sun.
-    pub(crate) fn sky_radiance(&self, direction: Vec3) -> Vec3 {
-        self.environment.as_ref().map_or(Vec3::ZERO, |map| map.radiance(self.to_sky(direction)))
-    }
-
-    /// The density with which the environment samples a direction.
-    pub(crate) fn sky_density(&self, direction: Vec3) -> f32 {
-        self.environment.as_ref().map_or(0.0, |map| map.density(self.to_sky(direction)))
+    /// Radiance of the environment from a direction, without the sun, and the density with which the environment
+    /// samples the direction.
+    pub(crate) fn sky(&self, direction: Vec3) -> (Vec3, f32) {
+        let of = |map: &Environment| map.radiance_and_density(self.to_sky(direction));
+        self.environment.as_ref().map_or((Vec3::ZERO, 0.0), of)
     }
 
     fn material_index(&self, face: u32) -> Option<usize> {
@@ -281,9 +282,11 @@ impl World {
         let direction = Vec3::from_array(ray.dir);
         let (e, f) = (corners[1] - corners[0], corners[2] - corners[0]);
         let scaled = e.cross(f);
-        let front = scaled.normalize().as_vec3();
+        let length = scaled.length();
+        let front = (scaled / length).as_vec3();
         let outside = direction.dot(front) < 0.0;
-        let weights = weights(position - corners[0], e, f, scaled);
+        let weights =
+            if self.varies { weights(position - corners[0], e, f, scaled) } else { [0.0; 2] };
         let uv = self.uv(face, weights);
         let material = self.material(face);
         let smooth = self.smooth_normal(face, weights).unwrap_or(front);
@@ -306,7 +309,7 @@ impl World {
             outside,
             uv,
             color: self.stage.colors.get(face as usize).map_or(Vec3::ONE, mix),
-            area: 0.5 * scaled.length() as f32,
+            area: 0.5 * length as f32,
         }
     }
 
