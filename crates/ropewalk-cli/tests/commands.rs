@@ -558,6 +558,17 @@ fn meshes_are_converted_whole_or_not_at_all() {
             (&10.into(), &4.into())
         );
     }
+    // What is generated like what is read.
+    let output = run(&["convert", "stage:room:1", "room.ply", "--json"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    let json: Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (file, format) in [("stage:room:1", "generated"), ("room.ply", "PLY")] {
+        let info = run(&["info", file, "--json"]);
+        assert!(info.status.success(), "{}", stderr(&info));
+        let info: Value = serde_json::from_slice(&info.stdout).unwrap();
+        assert_eq!(info["triangles"], json["triangles"]);
+        assert_eq!((&info["format"], &info["kind"]), (&format.into(), &"mesh".into()));
+    }
     let text = stderr(&run(&["convert", "a.obj", "b.stl"]));
     assert!(
         text.contains("b.stl: 10 triangles, 584 bytes") && text.contains("lost: normals"),
@@ -595,6 +606,9 @@ fn meshes_are_converted_whole_or_not_at_all() {
     refused(&["convert", "a.obj", "c.obj.gz"], 2, "expected a name that ends in .obj");
     refused(&["convert", "bad.obj", "c.ply"], 1, "bad.obj: line 2: expected a vertex from 1 to 1");
     refused(&["convert", "s.nff", "c.ply"], 1, "found a scene in NFF");
+    refused(&["convert", "spd:balls:1", "c.ply"], 1, "found a scene in NFF");
+    refused(&["convert", "stage:hall", "c.ply"], 1, "expected a built-in stage (room), found");
+    refused(&["info", "stage:hall"], 1, "expected a built-in stage (room), found");
     refused(&["convert", "no.obj", "c.ply"], 1, "there is no such file");
     refused(&["convert", "a.obj", "no/c.ply"], 1, "cannot write no/c.ply");
     let after: Vec<String> =

@@ -20,8 +20,8 @@ mod watched;
 
 pub use file::write_atomically;
 pub use mesh::{
-    Defects, MergeError, Mesh, MeshError, MeshFormat, MeshLimits, MeshOutput, PlacedMeshes,
-    Placement, Recognised,
+    Defects, FlattenError, MergeError, Mesh, MeshError, MeshFormat, MeshLimits, MeshOutput,
+    PlacedMeshes, Placement, Recognised,
 };
 pub use model::{Camera, Cone, FacetPolicy, Light, Material, Object, Scene, SceneSink, Surface};
 pub use nff::{NffError, NffErrorKind, NffLimits, NffReadError, NffStats, NffWriter, NumberFormat};

@@ -1,6 +1,6 @@
 //! Meshes of glTF files that are kept once, with where they are placed.
 
-use ropewalk_scene::{Mesh, MeshFormat, MeshLimits, PlacedMeshes, Stage};
+use ropewalk_scene::{Mesh, MeshFormat, MeshLimits, PlacedMeshes, Placement, Stage};
 use std::path::Path;
 
 const LIMITS: MeshLimits = MeshLimits::DEFAULT;
@@ -108,7 +108,7 @@ fn they_come_to_the_mesh_of_all() {
     ] {
         let found = placed(nodes, &LIMITS).unwrap();
         let flat = Mesh::parse(MeshFormat::Gltf, &gltf(nodes), None, &LIMITS).unwrap();
-        assert_eq!(bits(&found.flatten()), bits(&flat), "{nodes}");
+        assert_eq!(bits(&found.flatten(&LIMITS).unwrap()), bits(&flat), "{nodes}");
         assert_eq!(found.faces(), flat.faces.len());
         assert_eq!((found.meshes.len(), found.placements.len()), (meshes, placements), "{nodes}");
         let stage = Stage::parse(MeshFormat::Gltf, &gltf(nodes), None, &LIMITS).unwrap();
@@ -213,9 +213,37 @@ fn other_formats_hold_one_mesh() {
     let found = PlacedMeshes::parse(MeshFormat::Obj, text, None, &LIMITS).unwrap();
     let mesh = Mesh::parse(MeshFormat::Obj, text, None, &LIMITS).unwrap();
     assert_eq!((&found.meshes[..], found.placements.len()), (&[mesh.clone()][..], 1));
-    assert_eq!((found.placements[0].node, bits(&found.flatten())), (None, bits(&mesh)));
+    assert_eq!(
+        (found.placements[0].node, bits(&found.flatten(&LIMITS).unwrap())),
+        (None, bits(&mesh))
+    );
     let stage = Stage::parse(MeshFormat::Obj, text, None, &LIMITS).unwrap();
     assert_eq!((stage.meshes, stage.placements), (1, 1));
     let error = PlacedMeshes::read(Path::new("absent.glb"), &LIMITS).unwrap_err().to_string();
     assert!(error.starts_with("absent.glb: "), "{error}");
+}
+
+#[test]
+fn placements_that_come_to_too_much_are_refused_before_anything_is_allocated() {
+    let mesh = Mesh { vertices: vec![[0.0; 3]; 1 << 16], faces: vec![[0, 1, 2]; 5] };
+    let many = |count: usize| {
+        let transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+        let placement = Placement { mesh: 0, transform, name: "".into(), node: None };
+        PlacedMeshes { meshes: vec![mesh.clone()], placements: vec![placement; count] }
+    };
+    let limits = MeshLimits { vertices: usize::MAX, faces: 10, ..LIMITS };
+    let told = |count| many(count).flatten(&limits).map(|mesh| mesh.faces.len());
+    assert_eq!(told(2), Ok(10));
+    assert_eq!(
+        told(3).unwrap_err().to_string(),
+        "expected 10 triangles at most, found 15 in 3 placements"
+    );
+    // One vertex more than a face can name.
+    assert_eq!(
+        told(1 << 16).unwrap_err().to_string(),
+        "expected 4294967295 vertices at most, found 4294967296 in 65536 placements"
+    );
+    let limits = MeshLimits { vertices: (1 << 17) - 1, ..LIMITS };
+    let told = many(2).flatten(&limits).unwrap_err().to_string();
+    assert_eq!(told, "expected 131071 vertices at most, found 131072 in 2 placements");
 }

@@ -3,8 +3,10 @@
 use crate::interrupt::{self, Cancel};
 use crate::output::{print_json, thousands, usage};
 use anyhow::Context;
+use ropewalk_scene::room::room;
 use ropewalk_scene::{
-    MergeError, MeshLimits, MeshOutput, Recognised, Stage, recognise, write_atomically,
+    Builtin, MergeError, MeshLimits, MeshOutput, Recognised, Stage, parse_builtin, recognise,
+    write_atomically,
 };
 use serde::Serialize;
 use std::io::{self, Write};
@@ -14,7 +16,7 @@ use std::time::Instant;
 /// Arguments of `convert`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A mesh in OBJ, PLY, STL, OFF or glTF, gzipped or not
+    /// A mesh in OBJ, PLY, STL, OFF or glTF, gzipped or not, or stage:room
     from: PathBuf,
     /// The file to write: .obj, .ply, .stl, .off or .glb, the binary form where there is one
     to: PathBuf,
@@ -62,14 +64,25 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         return Err(usage(format!("{}: the input itself is not overwritten", args.to.display())));
     }
     let from = args.from.to_string_lossy();
-    if recognise(&from)? == Recognised::Nff {
+    let builtin = parse_builtin(&from)?;
+    let is_scene = match builtin {
+        Some(Builtin::Spd(..)) => true,
+        Some(Builtin::Room(_)) => false,
+        None => recognise(&from)? == Recognised::Nff,
+    };
+    if is_scene {
         anyhow::bail!(
             "{from}: expected a mesh, found a scene in NFF, whose shapes are no triangles"
         );
     }
     let cancel = Cancel::new();
     let bar = interrupt::spinner("reading");
-    let stage = Stage::read_monitored(&args.from, &MeshLimits::DEFAULT, &cancel);
+    let stage = if let Some(Builtin::Room(size)) = builtin {
+        room(size).with_context(|| format!("{from}: there is no room of that size"))
+    } else {
+        let stage = Stage::read_monitored(&args.from, &MeshLimits::DEFAULT, &cancel);
+        stage.map_err(anyhow::Error::from)
+    };
     bar.set_message("writing");
     if cancel.is_set() {
         return Err(interrupt::interrupted());

@@ -6,6 +6,7 @@ use ropewalk::file::{
     AnyOpened, FORMAT_VERSION, LAYOUT_VERSION, Opened, SHAPES_LAYOUT_VERSION, Tag, short,
 };
 use ropewalk::wide::WideTree;
+use ropewalk_scene::parse_builtin;
 use serde::Serialize;
 use std::time::Instant;
 
@@ -13,7 +14,7 @@ use std::time::Instant;
 #[derive(clap::Args)]
 pub struct Args {
     /// A saved scene, from `ropewalk build --save` or `Scene.save` in Python; a mesh in OBJ, PLY, STL, OFF or glTF; a
-    /// scene in NFF
+    /// scene in NFF; a built-in scene such as spd:balls:4 or stage:room
     file: String,
     /// Of a saved scene, check all checksums as well
     #[arg(long)]
@@ -99,7 +100,8 @@ fn meaning(tag: Tag) -> &'static str {
 /// Opens, checks and prints.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     // What is not there is said by those who open saved scenes.
-    let is_other = args.file.starts_with("spd:") || std::path::Path::new(&args.file).exists();
+    let is_builtin = parse_builtin(&args.file)?.is_some();
+    let is_other = is_builtin || std::path::Path::new(&args.file).exists();
     if is_other && !saved::is_saved(&args.file) {
         if args.verify {
             return Err(usage(format!("{}: --verify is for saved scenes", args.file)));

@@ -2,10 +2,12 @@
 
 use crate::interrupt::{self, Cancel};
 use crate::output::{print_json, print_text, thousands};
+use anyhow::Context;
+use ropewalk_scene::room::room;
 use ropewalk_scene::stage::Light;
 use ropewalk_scene::{
-    Camera, Defects, FacetPolicy, Loaded, MeshFormat, MeshLimits, NffLimits, Recognised, Scene,
-    Stage, Surface, load_monitored, parse_builtin, recognise,
+    Builtin, Camera, Defects, FacetPolicy, Loaded, MeshFormat, MeshLimits, NffLimits, Recognised,
+    Scene, Stage, Surface, load_monitored, parse_builtin, recognise,
 };
 use serde::Serialize;
 use std::fmt::Write;
@@ -114,10 +116,19 @@ impl From<&Defects> for DefectCounts {
 /// Reads and prints a scene or a mesh.
 pub fn run(file: &str, json: bool) -> anyhow::Result<()> {
     let cancel = Cancel::new();
-    if parse_builtin(file)?.is_none()
+    let builtin = parse_builtin(file)?;
+    let mesh = if let Some(Builtin::Room(size)) = builtin {
+        let made = || room(size).with_context(|| format!("{file}: there is no room of that size"));
+        Some(read_mesh(file, "generated", &cancel, made)?)
+    } else if builtin.is_none()
         && let Recognised::Mesh(format) = recognise(file)?
     {
-        let output = read_mesh(file, format, &cancel)?;
+        let read = || Ok(Stage::read_monitored(Path::new(file), &MeshLimits::DEFAULT, &cancel)?);
+        Some(read_mesh(file, name(format), &cancel, read)?)
+    } else {
+        None
+    };
+    if let Some(output) = mesh {
         return if json { print_json(&output) } else { output.print() };
     }
     let loaded = load_monitored(file, &NffLimits::default(), &cancel);
@@ -132,10 +143,15 @@ pub fn run(file: &str, json: bool) -> anyhow::Result<()> {
     if json { print_json(&output) } else { output.print() }
 }
 
-fn read_mesh(file: &str, format: MeshFormat, cancel: &Cancel) -> anyhow::Result<MeshOutput> {
+fn read_mesh(
+    file: &str,
+    format: &'static str,
+    cancel: &Cancel,
+    read: impl FnOnce() -> anyhow::Result<Stage>,
+) -> anyhow::Result<MeshOutput> {
     let bar = interrupt::spinner("reading");
     let start = Instant::now();
-    let stage = Stage::read_monitored(Path::new(file), &MeshLimits::DEFAULT, cancel);
+    let stage = read();
     let read = start.elapsed().as_secs_f64();
     bar.set_message("checking");
     if cancel.is_set() {
@@ -161,7 +177,7 @@ fn name(format: MeshFormat) -> &'static str {
 impl MeshOutput {
     fn new(
         file: &str,
-        format: MeshFormat,
+        format: &'static str,
         stage: &Stage,
         defects: &Defects,
         seconds: Seconds,
@@ -185,7 +201,7 @@ impl MeshOutput {
         MeshOutput {
             file: file.to_owned(),
             kind: "mesh",
-            format: name(format),
+            format,
             vertices: stage.mesh.vertices.len(),
             triangles: stage.mesh.faces.len(),
             meshes: stage.meshes,

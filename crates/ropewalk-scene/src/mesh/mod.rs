@@ -32,7 +32,7 @@ pub(crate) use format::{HEAD, recognise};
 pub use format::{MeshFormat, Recognised};
 pub(crate) use input::GZIP_MAGIC;
 pub use merge::MergeError;
-pub use placed::{PlacedMeshes, Placement};
+pub use placed::{FlattenError, PlacedMeshes, Placement};
 pub use write::MeshOutput;
 
 use crate::stage::{Material, Stage};

@@ -91,9 +91,33 @@ impl PlacedMeshes {
     }
 
     /// All meshes in their places as one: the mesh that [`Mesh::read`] has of the same file, bit for bit, except for vertices
-    /// of meshes without triangles.
-    pub fn flatten(&self) -> Mesh {
+    /// of meshes without triangles. Nothing is allocated before the limits have been looked at, of which those of vertices
+    /// and faces count.
+    ///
+    /// # Errors
+    /// [`FlattenError`] if the placements come to more than the limits, or to more vertices than a face can name.
+    pub fn flatten(&self, limits: &MeshLimits) -> std::result::Result<Mesh, FlattenError> {
+        let count = |of: fn(&Mesh) -> usize| {
+            let all = self.placements.iter().map(|placed| of(&self.meshes[placed.mesh as usize]));
+            all.fold(0, usize::saturating_add)
+        };
+        let refuse = |what, found: usize, limit: usize| FlattenError {
+            what,
+            found,
+            limit,
+            placements: self.placements.len(),
+        };
+        let (vertices, most) = (count(|mesh| mesh.vertices.len()), u32::MAX as usize);
+        let (faces, limit) = (self.faces(), limits.vertices.min(most));
+        if vertices > limit {
+            return Err(refuse("vertices", vertices, limit));
+        }
+        if faces > limits.faces {
+            return Err(refuse("triangles", faces, limits.faces));
+        }
         let mut flat = Mesh::default();
+        flat.vertices.reserve_exact(vertices);
+        flat.faces.reserve_exact(faces);
         for Placement { mesh, transform, .. } in &self.placements {
             let mesh = &self.meshes[*mesh as usize];
             let first = flat.vertices.len() as u32;
@@ -109,8 +133,22 @@ impl PlacedMeshes {
                 if is_mirrored { [a, c, b] } else { [a, b, c] }
             }));
         }
-        flat
+        Ok(flat)
     }
+}
+
+/// Why placements were not made one mesh.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("expected {limit} {what} at most, found {found} in {placements} placements")]
+pub struct FlattenError {
+    /// `vertices` or `triangles`.
+    pub what: &'static str,
+    /// How many they come to.
+    pub found: usize,
+    /// How many there may be.
+    pub limit: usize,
+    /// How many placements there are.
+    pub placements: usize,
 }
 
 /// A vertex in its place.
