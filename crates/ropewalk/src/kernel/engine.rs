@@ -8,6 +8,7 @@
 use super::batch::{AllHits, Start};
 use super::beam::{BatchReport, BeamQuery, Walk};
 use super::entry::{Climb, Path};
+use super::entry_packet::Packets;
 use super::events::{BatchEvents, Events, NoEvents};
 use super::exact::Exact;
 use super::lanes::{Crowd, Lanes};
@@ -453,7 +454,7 @@ impl<'a> Engine<'a> {
         let report = BatchReport { wave_rays: rays.len() as u64, ..BatchReport::default() };
         let search = match way {
             Way::Root => None,
-            Way::Entry => Path::new(self.tree).map(|path| Search::Path(Box::new(path))),
+            Way::Entry => Packets::new(self.tree).map(|packets| Search::Path(Box::new(packets))),
             Way::Cells => {
                 Climb::new(self.tree).map(|climb| Search::Cells(self.cells_from(first_ray), climb))
             }

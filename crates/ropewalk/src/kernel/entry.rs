@@ -15,6 +15,8 @@
 
 #![allow(unsafe_code)]
 
+use super::beam::Vector;
+use super::entry_packet::{Columns, PACKET};
 use super::events::Events;
 use super::slot::TINY;
 use crate::aabb::Aabb;
@@ -95,6 +97,15 @@ pub const fn path(child: usize) -> [usize; 3] {
 /// # Safety
 /// The methods may only run on a machine with the level's features.
 pub trait Locate: Copy {
+    /// One number of each segment of a packet.
+    type Row: Vector;
+
+    /// The numbers of some rays by their places.
+    ///
+    /// # Safety
+    /// See the trait.
+    unsafe fn columns(rays: &[Ray; PACKET], columns: &mut Columns);
+
     /// Writes a ray in one piece: written number by number it could not be read back as vectors at once,
     /// which costs more than all else about a segment in an empty cell.
     ///
@@ -191,20 +202,41 @@ impl Path {
         events: &mut E,
     ) -> Option<u32> {
         // SAFETY: passed on to the caller.
-        let code = unsafe {
-            let segment = L::segment(ray, self.slack);
-            if L::lies_in(&segment, &self.leaf.cell) {
-                let code = self.leaf.code;
-                if Self::is_clear::<L, E>(tree, &segment, code, events) { 0 } else { code }
-            } else {
-                self.search::<L, E>(tree, &segment, events)
-            }
-        };
+        let code =
+            unsafe { self.enter_segment::<L, E>(tree, &L::segment(ray, self.slack), events) };
         if code == 0 {
-            events.skipped();
+            events.skipped(1);
             return None;
         }
         Some(code)
+    }
+
+    /// By how much boxes of segments are widened.
+    #[inline(always)]
+    pub(super) fn slack(&self) -> f32 {
+        self.slack
+    }
+
+    /// The code of the cell from which what is in a box is to be walked; 0 if nothing is near.
+    ///
+    /// # Safety
+    /// As for [`Path::enter`].
+    #[inline(always)]
+    pub(super) unsafe fn enter_segment<L: Locate, E: Events>(
+        &mut self,
+        tree: &WideTree,
+        segment: &Segment,
+        events: &mut E,
+    ) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe {
+            if L::lies_in(segment, &self.leaf.cell) {
+                let code = self.leaf.code;
+                if Self::is_clear::<L, E>(tree, segment, code, events) { 0 } else { code }
+            } else {
+                self.search::<L, E>(tree, segment, events)
+            }
+        }
     }
 
     /// Moves the path to where the segment is; the code of its entry, 0 if it hits nothing.
@@ -387,7 +419,7 @@ impl<'a> Climb<'a> {
             }
         };
         if code == 0 {
-            events.skipped();
+            events.skipped(1);
             return None;
         }
         Some(code)

@@ -5,7 +5,9 @@
 
 use super::avx2::Avx2;
 use super::avx512::Avx512;
+use super::beam::{Eight, Pair, Sixteen};
 use super::entry::{Corners, Locate, REACH, Segment, path};
+use super::entry_packet::{Columns, PACKET};
 use super::x86::SIGN;
 use crate::ray::Ray;
 use crate::wide::{AXIS_SHIFTS, Block, Treelet};
@@ -179,9 +181,83 @@ unsafe fn narrow(cell: &Corners, treelet: &Treelet, child: usize) -> Corners {
     }
 }
 
+/// [`Locate::columns`], eight rays at a time.
+///
+/// # Safety
+/// The machine must have AVX2, and the caller must enable it.
+#[inline(always)]
+unsafe fn columns(rays: &[Ray; PACKET], columns: &mut Columns) {
+    for half in 0..2 {
+        // SAFETY: the caller vouches for the features; a ray is eight floats, columns are aligned.
+        unsafe {
+            let row =
+                |i: usize| _mm256_loadu_ps(std::ptr::from_ref(&rays[8 * half + i]).cast::<f32>());
+            let pair = |i: usize| {
+                let (a, b) = (row(i), row(i + 1));
+                (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b))
+            };
+            let four = |i: usize| {
+                let ((a, b), (c, d)) = (pair(i), pair(i + 2));
+                [
+                    _mm256_shuffle_ps::<0x44>(a, c),
+                    _mm256_shuffle_ps::<0xEE>(a, c),
+                    _mm256_shuffle_ps::<0x44>(b, d),
+                    _mm256_shuffle_ps::<0xEE>(b, d),
+                ]
+            };
+            let (first, second) = (four(0), four(4));
+            for i in 0..4 {
+                let (a, b) = (first[i], second[i]);
+                let low = _mm256_permute2f128_ps::<0x20>(a, b);
+                let high = _mm256_permute2f128_ps::<0x31>(a, b);
+                _mm256_store_ps(columns.0[i].as_mut_ptr().add(8 * half), low);
+                _mm256_store_ps(columns.0[i + 4].as_mut_ptr().add(8 * half), high);
+            }
+        }
+    }
+}
+
+/// The same, sixteen rays at once.
+///
+/// # Safety
+/// The machine must have AVX-512, and the caller must enable it.
+#[inline(always)]
+unsafe fn columns_512(rays: &[Ray; PACKET], columns: &mut Columns) {
+    // SAFETY: the caller vouches for the features; a ray is eight floats, columns are aligned.
+    unsafe {
+        for half in 0..2 {
+            let quarter =
+                |i: usize| _mm_loadu_ps(std::ptr::from_ref(&rays[i]).cast::<f32>().add(4 * half));
+            // Every fourth ray, so that the quarters come out in their order.
+            let row = |i: usize| {
+                let row = _mm512_castps128_ps512(quarter(i));
+                let row = _mm512_insertf32x4::<1>(row, quarter(i + 4));
+                let row = _mm512_insertf32x4::<2>(row, quarter(i + 8));
+                _mm512_insertf32x4::<3>(row, quarter(i + 12))
+            };
+            let [a, b, c, d] = [row(0), row(1), row(2), row(3)];
+            let (e, f) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+            let (g, h) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+            let to = columns.0.as_mut_ptr().add(4 * half);
+            _mm512_store_ps(to.cast(), _mm512_shuffle_ps::<0x44>(e, g));
+            _mm512_store_ps(to.add(1).cast(), _mm512_shuffle_ps::<0xEE>(e, g));
+            _mm512_store_ps(to.add(2).cast(), _mm512_shuffle_ps::<0x44>(f, h));
+            _mm512_store_ps(to.add(3).cast(), _mm512_shuffle_ps::<0xEE>(f, h));
+        }
+    }
+}
+
 macro_rules! locate {
-    ($level:ty) => {
+    ($level:ty, $row:ty, $columns:ident) => {
         impl Locate for $level {
+            type Row = $row;
+
+            #[inline(always)]
+            unsafe fn columns(rays: &[Ray; PACKET], columns: &mut Columns) {
+                // SAFETY: passed on to the caller.
+                unsafe { $columns(rays, columns) }
+            }
+
             #[inline(always)]
             unsafe fn put(to: &mut Ray, ray: &Ray) {
                 // SAFETY: passed on to the caller.
@@ -226,5 +302,5 @@ macro_rules! locate {
         }
     };
 }
-locate!(Avx2);
-locate!(Avx512);
+locate!(Avx2, Pair<Eight>, columns);
+locate!(Avx512, Sixteen, columns_512);

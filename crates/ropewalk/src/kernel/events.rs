@@ -6,9 +6,9 @@ pub trait Events {
     /// Rays are under way.
     #[inline(always)]
     fn rays(&mut self, _n: usize) {}
-    /// A ray is known to hit nothing where it is: no steps, no tests.
+    /// Rays are known to hit nothing where they are: no steps, no tests.
     #[inline(always)]
-    fn skipped(&mut self) {}
+    fn skipped(&mut self, _n: u32) {}
     /// The entry search looks at a treelet.
     #[inline(always)]
     fn looked(&mut self) {}
@@ -64,8 +64,8 @@ impl Events for BatchEvents {
     fn rays(&mut self, n: usize) {
         self.rays += n as u64;
     }
-    fn skipped(&mut self) {
-        self.skipped += 1;
+    fn skipped(&mut self, n: u32) {
+        self.skipped += u64::from(n);
     }
     fn looked(&mut self) {
         self.looked += 1;

@@ -18,6 +18,7 @@ mod beam;
 mod double;
 mod engine;
 mod entry;
+mod entry_packet;
 mod entry_x86;
 mod events;
 mod exact;

@@ -4,6 +4,7 @@
 
 use super::beam::PortableLanes;
 use super::entry::{Corners, Locate, REACH, Segment, path};
+use super::entry_packet::{Columns, PACKET};
 use super::level::{
     DEPTH_SLACK, Found, Nearest, ROUNDED_DEPTH, ROUNDED_SIZE, Range, Root, Simd, WEIGHT_SLACK,
 };
@@ -175,6 +176,19 @@ impl Simd for Scalar {
 }
 
 impl Locate for Scalar {
+    type Row = PortableLanes<PACKET>;
+
+    #[inline(always)]
+    unsafe fn columns(rays: &[Ray; PACKET], columns: &mut Columns) {
+        for (i, Ray { origin: o, dir: d, t_min, t_max }) in rays.iter().enumerate() {
+            for (column, x) in
+                columns.0.iter_mut().zip([o[0], o[1], o[2], d[0], d[1], d[2], *t_min, *t_max])
+            {
+                column[i] = x;
+            }
+        }
+    }
+
     #[inline(always)]
     unsafe fn put(to: &mut Ray, ray: &Ray) {
         *to = *ray;

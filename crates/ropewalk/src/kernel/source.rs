@@ -2,7 +2,8 @@
 
 #![allow(unsafe_code)]
 
-use super::entry::{Climb, Path};
+use super::entry::Climb;
+use super::entry_packet::{PACKET, Packets};
 use super::events::Events;
 use super::level::Simd;
 use super::query::BatchQuery;
@@ -115,12 +116,21 @@ pub struct FromEntry<'a> {
     rays: &'a [Ray],
     next: usize,
     search: Search<'a>,
+    packet: Packet,
+}
+
+/// Rays of which it is known where they enter.
+struct Packet {
+    first: usize,
+    /// Those not yet handed out.
+    left: u32,
+    entries: [u32; PACKET],
 }
 
 /// From where entries are searched for: one type, so that the wave is compiled for one.
 pub enum Search<'a> {
-    /// From where the ray before was.
-    Path(Box<Path>),
+    /// From where the rays before were.
+    Path(Box<Packets>),
     /// From the cell that is given for each ray; rays beyond the end of these have none.
     Cells(&'a [Option<Cell>], Climb<'a>),
 }
@@ -128,7 +138,8 @@ pub enum Search<'a> {
 impl<'a> FromEntry<'a> {
     /// From the first ray on; what is searched belongs to the tree.
     pub fn new(rays: &'a [Ray], search: Search<'a>) -> Self {
-        FromEntry { rays, next: 0, search }
+        let packet = Packet { first: 0, left: 0, entries: [0; PACKET] };
+        FromEntry { rays, next: 0, search, packet }
     }
 
     /// How the rays went.
@@ -151,24 +162,41 @@ impl<Q: BatchQuery> Source<Q> for FromEntry<'_> {
         query: &mut Q,
         events: &mut E,
     ) -> Option<(usize, u32)> {
-        while let Some(ray) = self.rays.get(self.next) {
-            let index = self.next;
-            self.next += 1;
+        loop {
+            let Packet { first, left, entries } = &mut self.packet;
+            if *left != 0 {
+                let i = left.trailing_zeros() as usize % PACKET;
+                *left &= *left - 1;
+                return Some((*first + i, entries[i]));
+            }
+            let (index, rays) = (self.next, self.rays.get(self.next..)?);
+            let ray = rays.first()?;
             // SAFETY: passed on to the caller.
             let entry = unsafe {
                 match &mut self.search {
-                    Search::Path(path) => path.enter::<L, E>(tree, ray, events),
+                    Search::Path(packets) => {
+                        if packets.is_due() {
+                            let rays = &rays[..rays.len().min(PACKET)];
+                            *left = packets.enter_packet::<L, E>(tree, rays, entries, events);
+                            *first = index;
+                            self.next += rays.len();
+                            // Those that may hit something are answered later on.
+                            query.miss_all(index..self.next);
+                            continue;
+                        }
+                        packets.enter_one::<L, E>(tree, ray, events)
+                    }
                     Search::Cells(cells, climb) => {
                         let cell = cells.get(index).copied().flatten();
                         climb.enter::<L, E>(tree, ray, cell, events)
                     }
                 }
             };
+            self.next += 1;
             match entry {
                 Some(code) => return Some((index, code)),
                 None => query.miss(index),
             }
         }
-        None
     }
 }

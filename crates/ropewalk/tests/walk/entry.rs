@@ -131,6 +131,40 @@ fn entries_change_no_answer() {
     each(9, |d| scenes::exponent_soup(d, 60, -19.0, 19.0));
 }
 
+/// Short segments of one particle in turn go in packets, at every level.
+#[test]
+fn packets_change_no_answer() {
+    let mut sum = BatchEvents::default();
+    for seed in 0..8 {
+        let mut draw = Draw::new(60 + seed);
+        let geometry = match seed % 4 {
+            0 => scenes::soup(&mut draw, 300, 0.2),
+            1 => scenes::grid_quads(&mut draw, 60, 8),
+            2 => scenes::mixed(&mut draw, 100, seed > 3),
+            _ => scenes::offset(&scenes::soup(&mut draw, 200, 0.2), [1e4, 0.0, -1e4]),
+        };
+        let shape = TreeShape { max_depth: 20, ..TreeShape::default() };
+        let tree = random_tree(&mut draw, &geometry, shape).unwrap();
+        let (bounds, mut rays) = (geometry.bounds(), Vec::new());
+        let mut at = draw.point_in(&bounds);
+        for _ in 0..1500 {
+            let length = bounds.diagonal() * draw.uniform(0.0, 0.01);
+            let ray = Ray::new(at, draw.direction()).with_range(0.0, length as f32);
+            rays.push(ray);
+            at = ray.at(ray.t_max).map(|x| x as f32);
+            let inside = (0..3).all(|a| bounds.min[a] <= at[a] && at[a] <= bounds.max[a]);
+            if !inside || draw.chance(0.005) {
+                at = draw.point_in(&bounds);
+            }
+        }
+        end_at_hits(&mut draw, &geometry, &mut rays);
+        sum.rays += rays.len() as u64;
+        let events = check(&geometry, &tree, &rays);
+        sum.skipped += events.skipped;
+    }
+    assert!(sum.skipped > sum.rays / 3 && sum.skipped < sum.rays, "{sum:?}");
+}
+
 /// A segment in an empty cell needs no step and no test, in whatever order segments come.
 #[test]
 fn segments_in_empty_cells_end_there() {

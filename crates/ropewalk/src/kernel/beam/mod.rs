@@ -30,7 +30,7 @@ mod x86;
 
 pub use shaft::BeamSimd;
 pub use vector::Lanes as PortableLanes;
-pub use vector::{Doubles, Vector};
+pub use vector::{Doubles, Pair, Vector};
 #[cfg(target_arch = "x86_64")]
 pub use x86::{
     Eight, Eight512, EightDoubles, FourDoubles, Sixteen, larger_size_avx2, larger_size_avx512,

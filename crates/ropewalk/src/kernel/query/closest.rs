@@ -9,6 +9,7 @@ use crate::kernel::slot::Slot;
 use crate::kernel::wave::WAVE;
 use crate::ray::Hit;
 use crate::wide::{ID_MASK, WIDTH};
+use std::ops::Range;
 
 /// The first hit; ties to the lowest primitive.
 pub struct Closest<'a> {
@@ -151,6 +152,12 @@ impl BatchQuery for Closest<'_> {
     fn miss(&mut self, index: usize) {
         self.t[index] = f32::INFINITY;
         self.prim[index] = u32::MAX;
+    }
+
+    #[inline(always)]
+    fn miss_all(&mut self, rays: Range<usize>) {
+        self.t[rays.clone()].fill(f32::INFINITY);
+        self.prim[rays].fill(u32::MAX);
     }
 
     #[inline(always)]

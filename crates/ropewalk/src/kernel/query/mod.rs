@@ -88,6 +88,14 @@ pub trait BatchQuery {
     /// Ray `index` hits nothing, unless [`BatchQuery::finish`] says otherwise later on.
     fn miss(&mut self, index: usize);
 
+    /// [`BatchQuery::miss`] for some rays in turn.
+    #[inline(always)]
+    fn miss_all(&mut self, rays: std::ops::Range<usize>) {
+        for index in rays {
+            self.miss(index);
+        }
+    }
+
     /// Collects all that the ray of slot `k` may hit by itself, its numbers being too large or too small
     /// for the filters; only asked where [`BatchQuery::CANDIDATES`] is set.
     #[cold]
