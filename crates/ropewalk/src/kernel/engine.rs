@@ -18,6 +18,7 @@ use super::level::{Level, Root};
 use super::query::{Accepts, Any, BatchQuery, Closest, Count, Every, Filtered};
 use super::room::{Room, with_room};
 use super::scalar::Scalar;
+use super::scanlines::{Scanlines, Tiles};
 use super::single::with_slot;
 use super::slot::Slot;
 use super::sorted::{GROUP, SMALLEST, Sorter, Sorting};
@@ -343,6 +344,27 @@ impl<'a> Engine<'a> {
         if way != Way::Root || self.filter.is_some() || !self.beams || self.tree.has_shapes() {
             return self.run_filtered(rays, way, first_ray, query);
         }
+        match Scanlines::of(rays) {
+            Some(rows) => self.run_rows(rows, rays, query),
+            None => self.run_beams(rays, query),
+        }
+    }
+
+    /// Rays of a picture in rows, tile by tile.
+    fn run_rows<Q: BeamQuery>(&self, rows: Scanlines, rays: &[Ray], query: &mut Q) -> BatchReport {
+        let mut tiles = with_room(|room| std::mem::take(&mut room.tiles));
+        let mut report = BatchReport { tiled_rays: rays.len() as u64, ..BatchReport::default() };
+        tiles.start(rows);
+        while tiles.advance(rows, rays) {
+            let Tiles { rays, stood, answers, .. } = &mut tiles;
+            query.ask_moved(stood, answers, Tiled { engine: self, rays, report: &mut report });
+        }
+        with_room(|room| room.tiles = tiles);
+        report
+    }
+
+    /// Coherent rays in beams, the others in the wave from the root.
+    fn run_beams<Q: BeamQuery>(&self, rays: &[Ray], query: &mut Q) -> BatchReport {
         with_room(|room| {
             room.order.clear();
             let Room { order, all, slots, sorter, answers, beam, .. } = room;
@@ -369,7 +391,10 @@ impl<'a> Engine<'a> {
     fn task(&self, rays: &[Ray]) -> usize {
         let sorts = self.sorting == Sorting::Automatic && self.tree.bytes() >= SMALLEST;
         let share = rays.len() / (4 * rayon::current_num_threads());
-        if sorts { share.clamp(TASK, GROUP) } else { TASK }
+        let task = if sorts { share.clamp(TASK, GROUP) } else { TASK };
+        let bands = Scanlines::of(rays).map_or(task, |rows| rows.bands(task));
+        // Whole rows of a picture, unless there would be too few tasks.
+        if bands <= 2 * share.max(TASK) { bands } else { task }
     }
 
     /// True if the rays left to the wave are to be sorted.
@@ -611,9 +636,22 @@ struct Moved<'a, 'e> {
 }
 
 impl Walk for Moved<'_, '_> {
-    fn walk<Q: BatchQuery>(self, query: &mut Q) {
+    fn walk<Q: BeamQuery>(self, query: &mut Q) {
         let slots = &mut self.slots[..self.rays.len().min(wave_width())];
         let mut source = self.engine.rays_from_root::<Q>(self.rays, self.order);
         self.engine.wave::<Q, _, _, false>(slots, query, &mut source, &mut NoEvents);
+    }
+}
+
+/// Rays of a picture that have been moved into tiles.
+struct Tiled<'a, 'e> {
+    engine: &'a Engine<'e>,
+    rays: &'a [Ray],
+    report: &'a mut BatchReport,
+}
+
+impl Walk for Tiled<'_, '_> {
+    fn walk<Q: BeamQuery>(self, query: &mut Q) {
+        *self.report = *self.report + self.engine.run_beams(self.rays, query);
     }
 }

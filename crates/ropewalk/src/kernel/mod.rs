@@ -39,6 +39,7 @@ mod query;
 mod random;
 mod room;
 mod scalar;
+mod scanlines;
 mod single;
 mod slot;
 mod sorted;

@@ -2,6 +2,7 @@
 
 use super::beam::{self, Answers};
 use super::query::Every;
+use super::scanlines::Tiles;
 use super::slot::Slot;
 use super::sorted::Sorter;
 use super::wave::WAVE;
@@ -15,6 +16,7 @@ pub struct Room {
     pub every: Every,
     pub sorter: Sorter,
     pub answers: Answers,
+    pub tiles: Tiles,
     /// 0, 1, 2 and so on, as far as it was needed.
     pub all: Vec<u32>,
 }
@@ -33,6 +35,7 @@ pub fn with_room<T>(work: impl FnOnce(&mut Room) -> T) -> T {
             every: Every::default(),
             sorter: Sorter::default(),
             answers: Answers::default(),
+            tiles: Tiles::default(),
             all: Vec::new(),
         })
     });

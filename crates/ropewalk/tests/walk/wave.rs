@@ -303,6 +303,55 @@ fn threads_do_not_change_answers() {
     assert_eq!((kept.offsets, kept.t), (vec![0; 4], vec![]));
 }
 
+/// Pictures in rows go in tiles, wherever the batch begins and ends, and are answered where they stand.
+#[test]
+fn rows_of_a_picture_are_answered_where_they_stand() {
+    let mut draw = Draw::new(31);
+    let geometry = scenes::soup(&mut draw, 300, 1.0);
+    let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+    let wide = WideTree::compile(&tree, &geometry).unwrap();
+    let (bounds, size) = (geometry.bounds(), geometry.bounds().diagonal() as f32);
+    let oracle = BruteForce { geometry: &geometry };
+    for (width, height, parallel) in [(100, 61, false), (64, 40, true), (333, 17, false)] {
+        let at = |i: usize| {
+            let x = (i % width) as f32 / width as f32 - 0.5;
+            let y = ((i / width) as f32 - 0.5 * height as f32) / width as f32;
+            let mut from: [f32; 3] = std::array::from_fn(|a| 0.5 * (bounds.min[a] + bounds.max[a]));
+            from[2] += size;
+            match parallel {
+                true => Ray::new(
+                    [from[0] + 0.5 * size * x, from[1] + 0.5 * size * y, from[2]],
+                    [0.01, 0.02, -1.0],
+                ),
+                false => Ray::new(from, [0.5 * x, 0.5 * y, -1.0]),
+            }
+        };
+        let rays: Vec<Ray> = (0..width * height).map(at).collect();
+        for rays in [&rays[..], &rays[37..], &rays[..rays.len() - 5]] {
+            let expected: Vec<_> =
+                rays.iter().map(|r| oracle.closest_hit(r, &mut NoCounts)).collect();
+            assert!(expected.iter().flatten().count() > rays.len() / 20);
+            for level in Level::ALL {
+                let Some(caster) = BatchCaster::new(&wide, &geometry).with_level(level) else {
+                    continue;
+                };
+                let (mut t, mut prim) = (vec![0.0; rays.len()], vec![0; rays.len()]);
+                let one = caster.with_threads(1);
+                let report = one.closest_hit_into(rays, &mut t, &mut prim);
+                assert_eq!(report.tiled_rays, rays.len() as u64, "{width}");
+                assert_eq!(report.beam_rays + report.wave_rays, rays.len() as u64);
+                assert_eq!(caster.closest_hit(rays), one.closest_hit(rays));
+                let occluded = one.occluded(rays);
+                for (i, hit) in expected.iter().enumerate() {
+                    let hit = hit.map_or((f32::INFINITY, u32::MAX), |h| (h.t, h.prim_id));
+                    assert_eq!((t[i], prim[i]), hit, "{width}, ray {i}, {}", level.name());
+                    assert_eq!(occluded[i], hit.1 != u32::MAX, "{width}, ray {i}");
+                }
+            }
+        }
+    }
+}
+
 /// Also where only some rays are left to the wave, and with fewer rays than it holds.
 #[test]
 fn sorting_does_not_change_answers() {

@@ -127,7 +127,7 @@ pub trait BeamQuery: BatchQuery {
 /// A walk that any query may be put to.
 pub trait Walk {
     /// Answers all rays.
-    fn walk<Q: BatchQuery>(self, query: &mut Q);
+    fn walk<Q: BeamQuery>(self, query: &mut Q);
 }
 
 /// Answers of rays that have been moved.
@@ -209,6 +209,8 @@ pub struct BatchReport {
     pub near_rays: u64,
     /// Of these, rays that were sorted; see [`Sorting`](super::Sorting).
     pub sorted_rays: u64,
+    /// Rays of a picture in rows that were moved into tiles first, whichever way they went then.
+    pub tiled_rays: u64,
     /// Beams tried.
     pub beams: u64,
     /// Beams that turned out too wide for the tree; their rays were tried again or left to the wave.
@@ -235,6 +237,7 @@ impl std::ops::Add for BatchReport {
             climbed_rays: self.climbed_rays + other.climbed_rays,
             near_rays: self.near_rays + other.near_rays,
             sorted_rays: self.sorted_rays + other.sorted_rays,
+            tiled_rays: self.tiled_rays + other.tiled_rays,
             beams: self.beams + other.beams,
             given_up: self.given_up + other.given_up,
             steps: self.steps + other.steps,
