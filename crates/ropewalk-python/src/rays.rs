@@ -216,22 +216,62 @@ impl View<'_, f32> {
     /// Writes some rays to `rays`.
     pub fn interleave(&self, range: Range<usize>, rays: &mut Vec<Ray>) -> Invalid {
         rays.clear();
-        let mut invalid = Invalid::default();
-        rays.extend(range.map(|i| {
-            let ray = self.ray(i);
-            let [ox, oy, oz] = ray.origin;
-            let [dx, dy, dz] = ray.dir;
-            // 0 times infinity or NaN is NaN, and a sum of NaN is NaN.
-            let is_finite =
-                (ox * 0.0 + oy * 0.0 + oz * 0.0) + (dx * 0.0 + dy * 0.0 + dz * 0.0) == 0.0;
-            let has_range = !ray.t_min.is_nan() && !ray.t_max.is_nan();
-            if !is_finite || ray.dir == [0.0; 3] || !has_range {
-                invalid = invalid.and(Invalid { count: 1, first: i });
+        // One or one a ray is asked once, not for each ray: that took longer than all the rest.
+        let (origins, one_origin) = lines(self.origins, &range);
+        let (directions, one_direction) = lines(self.directions, &range);
+        let fine = if self.t_min.len() == 1 && self.t_max.len() == 1 {
+            let t = (self.t_min[0], self.t_max[0]);
+            let ends = |_| t;
+            match (one_origin, one_direction) {
+                (false, false) => fill(rays, &range, |i| origins[i], |i| directions[i], ends),
+                (true, false) => fill(rays, &range, |_| origins[0], |i| directions[i], ends),
+                (false, true) => fill(rays, &range, |i| origins[i], |_| directions[0], ends),
+                (true, true) => fill(rays, &range, |_| origins[0], |_| directions[0], ends),
             }
-            ray
-        }));
-        invalid
+        } else {
+            let origin = |i: usize| origins[if one_origin { 0 } else { i }];
+            let direction = |i: usize| directions[if one_direction { 0 } else { i }];
+            fill(rays, &range, origin, direction, |i| self.range(range.start + i))
+        };
+        if fine {
+            return Invalid::default();
+        }
+        let wrong = |ray: &Ray| {
+            let is_finite = ray.origin.iter().chain(&ray.dir).all(|x| x.is_finite());
+            !is_finite || ray.dir == [0.0; 3] || ray.t_min.is_nan() || ray.t_max.is_nan()
+        };
+        let one = |i| Invalid { count: 1, first: range.start + i };
+        let wrong = rays.iter().enumerate().filter(|(_, ray)| wrong(ray)).map(|(i, _)| one(i));
+        wrong.fold(Invalid::default(), Invalid::and)
     }
+}
+
+/// The points of some rays and whether there is but one for all.
+fn lines<'a>(values: &'a [f32], range: &Range<usize>) -> (&'a [[f32; 3]], bool) {
+    let (points, _) = values.as_chunks::<3>();
+    if points.len() == 1 { (points, true) } else { (&points[range.clone()], false) }
+}
+
+/// Writes rays whose parts are given by their number in the range; false if there may be one that is invalid.
+#[inline(always)]
+fn fill(
+    rays: &mut Vec<Ray>,
+    range: &Range<usize>,
+    origin: impl Fn(usize) -> [f32; 3],
+    direction: impl Fn(usize) -> [f32; 3],
+    ends: impl Fn(usize) -> (f32, f32),
+) -> bool {
+    let mut fine = true;
+    rays.extend((0..range.len()).map(|i| {
+        // Numbers, not rows of them: these would be put together in memory and wait for it.
+        let ([ox, oy, oz], [dx, dy, dz], (t_min, t_max)) = (origin(i), direction(i), ends(i));
+        // 0 times infinity or NaN is NaN, and a sum of NaN is NaN.
+        let sum = (ox * 0.0 + oy * 0.0 + oz * 0.0) + (dx * 0.0 + dy * 0.0 + dz * 0.0);
+        fine &= (sum == 0.0) & ((dx != 0.0) | (dy != 0.0) | (dz != 0.0));
+        fine &= !t_min.is_nan() & !t_max.is_nan();
+        Ray { origin: [ox, oy, oz], dir: [dx, dy, dz], t_min, t_max }
+    }));
+    fine
 }
 
 /// The sides of a name.
