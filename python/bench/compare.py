@@ -53,6 +53,14 @@ def primary(eye, at, angle):
     return origins, np.ascontiguousarray(directions, np.float32)
 
 
+def by_rows(rays):
+    """The rays of :func:`primary` row by row, as pictures in arrays have them."""
+    code = np.arange(SIDE * SIDE)
+    x = sum((code >> 2 * bit & 1) << bit for bit in range(10))
+    y = sum((code >> 2 * bit + 1 & 1) << bit for bit in range(10))
+    return rays[0], np.ascontiguousarray(rays[1][np.argsort(y * SIDE + x)])
+
+
 def diffuse(scene, rays, rng):
     """One cosine-weighted bounce off each primary hit, shuffled, and the faces that they leave."""
     hits = scene.closest_hit(*rays)
@@ -333,7 +341,12 @@ def main():
         made = engines(vertices, faces, scene, arguments.threads)
         eye = primary(*view(name, arguments, *scene.bounds.astype(np.float64)))
         *bounced, left = diffuse(scene, eye, rng)
-        work = {"primary": (0, eye), "diffuse": (0, bounced), "all hits": (1, chords(scene, rng))}
+        work = {
+            "primary": (0, eye),
+            "primary by rows": (0, by_rows(eye)),
+            "diffuse": (0, bounced),
+            "all hits": (1, chords(scene, rng)),
+        }
         for workload, (which, rays) in work.items():
             found = rates(made, which, rays, arguments.rounds, arguments.threads)
             best = max(rate for engine, rate in found.items() if engine != "ropewalk")

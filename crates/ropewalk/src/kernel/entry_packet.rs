@@ -107,18 +107,10 @@ impl Boxes {
     /// See [`Boxes::new`].
     #[inline(always)]
     unsafe fn meeting<V: Vector>(&self, Corners(around): &Corners, block: &Block) -> u32 {
-        // SAFETY: passed on to the caller; rows are loaded two at a time.
+        // SAFETY: passed on to the caller; rows have as many numbers as there are lanes.
         unsafe {
-            let rows = |i: usize, j: usize| {
-                let [p, q, r] = block.vertex.each_ref().map(|v| V::load_two(&v[i], &v[j]));
-                let (low, high) = (p.min(q).min(r), p.max(q).max(r));
-                let row = |i: usize| [around[i]; WIDTH];
-                let begins = V::load_two(&row(i), &row(j)).le(high);
-                // The upper corner is negated.
-                let ends = low.le(V::splat(0.0) - V::load_two(&row(i + 4), &row(j + 4)));
-                (low, high, begins & ends)
-            };
-            let ((low, high, both), (low_z, high_z, z)) = (rows(0, 1), rows(2, 2));
+            let (low, high, both) = extent::<V>(around, block, [0, 1]);
+            let (low_z, high_z, z) = extent::<V>(around, block, [2, 2]);
             // Triangles that something may meet: hardly any as a rule.
             let mut lanes = both & both >> WIDTH & z & ((1 << WIDTH) - 1);
             if lanes == 0 {
@@ -133,16 +125,38 @@ impl Boxes {
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize % WIDTH;
                 lanes &= lanes - 1;
-                let on = |a: usize, low: f32, high: f32| {
-                    V::load(&self.0[a]).le(V::splat(high))
-                        & V::load(&self.0[a + 3]).le(V::splat(-low))
-                };
-                met |= on(0, bounds[0][lane], bounds[2][lane])
-                    & on(1, bounds[0][lane + WIDTH], bounds[2][lane + WIDTH])
-                    & on(2, bounds[1][lane], bounds[3][lane]);
+                let (mut on, places) = (u32::MAX, [(0, lane), (0, lane + WIDTH), (1, lane)]);
+                for (a, (row, lane)) in places.into_iter().enumerate() {
+                    on &= V::load(&self.0[a]).le(V::splat(bounds[row + 2][lane]));
+                    on &= V::load(&self.0[a + 3]).le(V::splat(-bounds[row][lane]));
+                }
+                met |= on;
             }
             met
         }
+    }
+}
+
+/// Lower and upper corners of a block's triangles along two axes, one half of the lanes for each, and the lanes in which they
+/// meet a box.
+///
+/// A function, since what a closure does with vectors is called out of line where the CPU is not known to the compiler.
+///
+/// # Safety
+/// See [`Boxes::new`].
+#[inline(always)]
+unsafe fn extent<V: Vector>(around: &[f32; 8], block: &Block, [i, j]: [usize; 2]) -> (V, V, u32) {
+    // SAFETY: passed on to the caller; rows are loaded two at a time.
+    unsafe {
+        let [p, q, r] = &block.vertex;
+        let p = V::load_two(&p[i], &p[j]);
+        let q = V::load_two(&q[i], &q[j]);
+        let r = V::load_two(&r[i], &r[j]);
+        let (low, high) = (p.min(q).min(r), p.max(q).max(r));
+        let begins = V::load_two(&[around[i]; WIDTH], &[around[j]; WIDTH]);
+        // The upper corner is negated.
+        let ends = V::load_two(&[-around[i + 4]; WIDTH], &[-around[j + 4]; WIDTH]);
+        (low, high, begins.le(high) & low.le(ends))
     }
 }
 
@@ -314,8 +328,8 @@ impl Packets {
         Sorted { left: left & !rest, rest }
     }
 
-    /// Some of the rays, one by one.
-    #[cold]
+    /// Some of the rays, one by one; not called, since a function by itself would not know the level's features.
+    #[inline(always)]
     unsafe fn enter_each<L: Locate, E: Events>(
         &mut self,
         tree: &WideTree,

@@ -190,24 +190,22 @@ unsafe fn columns(rays: &[Ray; PACKET], columns: &mut Columns) {
     for half in 0..2 {
         // SAFETY: the caller vouches for the features; a ray is eight floats, columns are aligned.
         unsafe {
-            let row =
-                |i: usize| _mm256_loadu_ps(std::ptr::from_ref(&rays[8 * half + i]).cast::<f32>());
-            let pair = |i: usize| {
-                let (a, b) = (row(i), row(i + 1));
-                (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b))
-            };
-            let four = |i: usize| {
-                let ((a, b), (c, d)) = (pair(i), pair(i + 2));
-                [
-                    _mm256_shuffle_ps::<0x44>(a, c),
-                    _mm256_shuffle_ps::<0xEE>(a, c),
-                    _mm256_shuffle_ps::<0x44>(b, d),
-                    _mm256_shuffle_ps::<0xEE>(b, d),
-                ]
-            };
-            let (first, second) = (four(0), four(4));
+            let mut rows = [_mm256_setzero_ps(); 8];
+            for (i, row) in rows.iter_mut().enumerate() {
+                *row = _mm256_loadu_ps(std::ptr::from_ref(&rays[8 * half + i]).cast::<f32>());
+            }
+            let mut fours = [[_mm256_setzero_ps(); 4]; 2];
+            for (i, four) in fours.iter_mut().enumerate() {
+                let [a, b, c, d] = [rows[4 * i], rows[4 * i + 1], rows[4 * i + 2], rows[4 * i + 3]];
+                let (e, f) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+                let (g, h) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+                four[0] = _mm256_shuffle_ps::<0x44>(e, g);
+                four[1] = _mm256_shuffle_ps::<0xEE>(e, g);
+                four[2] = _mm256_shuffle_ps::<0x44>(f, h);
+                four[3] = _mm256_shuffle_ps::<0xEE>(f, h);
+            }
             for i in 0..4 {
-                let (a, b) = (first[i], second[i]);
+                let (a, b) = (fours[0][i], fours[1][i]);
                 let low = _mm256_permute2f128_ps::<0x20>(a, b);
                 let high = _mm256_permute2f128_ps::<0x31>(a, b);
                 _mm256_store_ps(columns.0[i].as_mut_ptr().add(8 * half), low);
@@ -223,19 +221,23 @@ unsafe fn columns(rays: &[Ray; PACKET], columns: &mut Columns) {
 /// The machine must have AVX-512, and the caller must enable it.
 #[inline(always)]
 unsafe fn columns_512(rays: &[Ray; PACKET], columns: &mut Columns) {
-    // SAFETY: the caller vouches for the features; a ray is eight floats, columns are aligned.
-    unsafe {
-        for half in 0..2 {
-            let quarter =
-                |i: usize| _mm_loadu_ps(std::ptr::from_ref(&rays[i]).cast::<f32>().add(4 * half));
-            // Every fourth ray, so that the quarters come out in their order.
-            let row = |i: usize| {
-                let row = _mm512_castps128_ps512(quarter(i));
-                let row = _mm512_insertf32x4::<1>(row, quarter(i + 4));
-                let row = _mm512_insertf32x4::<2>(row, quarter(i + 8));
-                _mm512_insertf32x4::<3>(row, quarter(i + 12))
-            };
-            let [a, b, c, d] = [row(0), row(1), row(2), row(3)];
+    for half in 0..2 {
+        // SAFETY: the caller vouches for the features; a ray is eight floats, columns are aligned.
+        unsafe {
+            let mut rows = [_mm512_setzero_ps(); 4];
+            for (i, row) in rows.iter_mut().enumerate() {
+                // Every fourth ray, so that the quarters come out in their order.
+                let mut quarters = [_mm_setzero_ps(); 4];
+                for (j, quarter) in quarters.iter_mut().enumerate() {
+                    let ray = std::ptr::from_ref(&rays[i + 4 * j]).cast::<f32>();
+                    *quarter = _mm_loadu_ps(ray.add(4 * half));
+                }
+                *row = _mm512_castps128_ps512(quarters[0]);
+                *row = _mm512_insertf32x4::<1>(*row, quarters[1]);
+                *row = _mm512_insertf32x4::<2>(*row, quarters[2]);
+                *row = _mm512_insertf32x4::<3>(*row, quarters[3]);
+            }
+            let [a, b, c, d] = rows;
             let (e, f) = (_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
             let (g, h) = (_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
             let to = columns.0.as_mut_ptr().add(4 * half);
