@@ -97,7 +97,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         stage.mesh.write(format, &mut Stoppable { out, cancel: &cancel })
     });
     bar.finish_and_clear();
-    if cancel.is_set() {
+    if cancel.is_set() && written.is_err() {
         return Err(interrupt::interrupted());
     }
     written.with_context(|| format!("cannot write {}", args.to.display()))?;
