@@ -3,10 +3,10 @@
 use super::beam::BatchReport;
 use super::engine::Engine;
 use super::events::BatchEvents;
-use super::lanes::{Crowd, Lanes};
 use super::level::Level;
 use super::query::{BatchQuery, HitFilter, NoFilter};
 use super::sorted::Sorting;
+use super::source::Source;
 use crate::geometry::Geometry;
 use crate::point::Cell;
 use crate::ray::{Hit, Ray};
@@ -223,11 +223,11 @@ impl<'a, F: HitFilter> BatchCaster<'a, F> {
     }
 
     /// See [`Engine::run_lanes`].
-    pub(crate) fn run_lanes<Q: BatchQuery, C: Crowd<Q>>(
+    pub(crate) fn run_lanes<Q: BatchQuery, S: Source<Q>>(
         &self,
         width: usize,
         query: &mut Q,
-        lanes: &mut Lanes<C>,
+        lanes: &mut S,
     ) {
         self.engine.run_lanes(width, query, lanes);
     }

@@ -11,7 +11,6 @@ use super::entry::{Climb, Path};
 use super::entry_packet::Packets;
 use super::events::{BatchEvents, Events, NoEvents};
 use super::exact::Exact;
-use super::lanes::{Crowd, Lanes};
 use super::launch::{run_beams, run_single, run_wave};
 use super::leaf::Leaves;
 use super::level::{Level, Root};
@@ -529,15 +528,15 @@ impl<'a> Engine<'a> {
         self.cells.and_then(|cells| cells.get(first_ray..)).unwrap_or(&[])
     }
 
-    /// All particles of some lanes, until each has come to its end; `query` is that of the lanes.
+    /// All segments of some particles, in `width` slots; `query` is that of the lanes.
     ///
     /// Particles of any type are part of the kernel's loop, since asking one through a pointer would take as long as the
     /// segment itself where there is nothing near: crates with particles of their own compile it for them.
-    pub fn run_lanes<Q: BatchQuery, C: Crowd<Q>>(
+    pub fn run_lanes<Q: BatchQuery, S: Source<Q>>(
         &self,
         width: usize,
         query: &mut Q,
-        lanes: &mut Lanes<C>,
+        lanes: &mut S,
     ) {
         with_room(|room| self.run_source(&mut room.slots[..width], query, lanes, &mut NoEvents));
     }

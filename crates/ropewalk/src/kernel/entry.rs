@@ -211,6 +211,16 @@ impl Path {
         Some(code)
     }
 
+    /// True if a segment lies in the root's cell: from elsewhere nothing is searched for.
+    ///
+    /// # Safety
+    /// As for [`Path::enter`].
+    #[inline(always)]
+    pub(super) unsafe fn holds<L: Locate>(&self, segment: &Segment) -> bool {
+        // SAFETY: passed on to the caller.
+        unsafe { L::lies_in(segment, &self.places[0].cell) }
+    }
+
     /// By how much boxes of segments are widened.
     #[inline(always)]
     pub(super) fn slack(&self) -> f32 {

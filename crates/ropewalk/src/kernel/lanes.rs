@@ -73,13 +73,10 @@ const ROOTED: u32 = 4096;
 /// The share of [`TRIED`] that the search must answer, as for batches of rays.
 const WORTHWHILE: f64 = 0.4;
 
-/// The particles of a crowd, one in each slot.
-pub struct Lanes<C> {
-    crowd: C,
-    rays: [Ray; WAVE],
-    before: [Before; WAVE],
-    /// The way to each lane's particle; none where the tree is a leaf.
-    paths: Vec<Path>,
+/// Whether entries are searched for, as far as that has paid.
+pub struct Trial {
+    /// True if there is anything to search.
+    possible: bool,
     searching: bool,
     /// Segments since it was last decided whether to search.
     tried: u32,
@@ -88,31 +85,27 @@ pub struct Lanes<C> {
     report: WalkReport,
 }
 
-impl<C> Lanes<C> {
-    /// Lanes for a wave of `width` slots, over a tree.
-    pub fn new(tree: &WideTree, width: usize, crowd: C) -> Self {
-        let path = || Path::new(tree);
-        let paths: Vec<Path> = (0..width.min(WAVE)).map_while(|_| path()).collect();
-        Lanes {
-            crowd,
-            rays: [Ray::new([0.0; 3], [1.0, 0.0, 0.0]); WAVE],
-            before: [Before::Nothing; WAVE],
-            searching: !paths.is_empty(),
-            paths,
-            tried: 0,
-            cleared: 0,
-            report: WalkReport::default(),
-        }
+impl Trial {
+    /// They are searched for at first, where that is possible.
+    pub fn new(possible: bool) -> Trial {
+        let report = WalkReport::default();
+        Trial { possible, searching: possible, tried: 0, cleared: 0, report }
     }
 
-    /// The crowd, and how its segments went.
-    pub fn into_parts(self) -> (C, WalkReport) {
-        (self.crowd, self.report)
+    /// True if the next segments are searched for.
+    #[inline(always)]
+    pub fn searching(&self) -> bool {
+        self.searching
+    }
+
+    /// How the segments went.
+    pub fn report(&self) -> WalkReport {
+        self.report
     }
 
     /// Takes note of some segments, of which the search answered `clear`.
     #[inline(always)]
-    fn note(&mut self, tried: u32, clear: u32) {
+    pub fn note(&mut self, tried: u32, clear: u32) {
         self.report.segments += u64::from(tried);
         self.report.searched += u64::from(if self.searching { tried } else { 0 });
         self.report.clear += u64::from(clear);
@@ -127,8 +120,38 @@ impl<C> Lanes<C> {
     #[cold]
     fn decide(&mut self) {
         let pays = f64::from(self.cleared) >= WORTHWHILE * f64::from(self.tried);
-        self.searching = !self.paths.is_empty() && (!self.searching || pays);
+        self.searching = self.possible && (!self.searching || pays);
         (self.tried, self.cleared) = (0, 0);
+    }
+}
+
+/// The particles of a crowd, one in each slot.
+pub struct Lanes<C> {
+    crowd: C,
+    rays: [Ray; WAVE],
+    before: [Before; WAVE],
+    /// The way to each lane's particle; none where the tree is a leaf.
+    paths: Vec<Path>,
+    trial: Trial,
+}
+
+impl<C> Lanes<C> {
+    /// Lanes for a wave of `width` slots, over a tree.
+    pub fn new(tree: &WideTree, width: usize, crowd: C) -> Self {
+        let path = || Path::new(tree);
+        let paths: Vec<Path> = (0..width.min(WAVE)).map_while(|_| path()).collect();
+        Lanes {
+            crowd,
+            rays: [Ray::new([0.0; 3], [1.0, 0.0, 0.0]); WAVE],
+            before: [Before::Nothing; WAVE],
+            trial: Trial::new(!paths.is_empty()),
+            paths,
+        }
+    }
+
+    /// The crowd, and how its segments went.
+    pub fn into_parts(self) -> (C, WalkReport) {
+        (self.crowd, self.trial.report())
     }
 }
 
@@ -156,7 +179,7 @@ impl<Q: BatchQuery, C: Crowd<Q>> Source<Q> for Lanes<C> {
             // SAFETY: passed on to the caller.
             unsafe { L::put(&mut self.rays[k], &ray) };
             let mut code = tree.root();
-            if self.searching {
+            if self.trial.searching() {
                 // SAFETY: passed on to the caller; the path is that of the tree.
                 match unsafe { self.paths[k].enter::<L, E>(tree, &self.rays[k], events) } {
                     Some(entry) => code = entry,
@@ -171,7 +194,7 @@ impl<Q: BatchQuery, C: Crowd<Q>> Source<Q> for Lanes<C> {
             self.crowd.wait(k);
             break Some((k, code));
         };
-        self.note(tried, clear);
+        self.trial.note(tried, clear);
         next
     }
 }

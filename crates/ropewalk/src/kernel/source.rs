@@ -6,12 +6,13 @@ use super::entry::Climb;
 use super::entry_packet::{PACKET, Packets};
 use super::events::Events;
 use super::level::Simd;
+use super::prefetch_line;
 use super::query::BatchQuery;
 use super::slot::Slot;
 use super::vicinity::Vicinity;
 use crate::point::Cell;
 use crate::ray::Ray;
-use crate::wide::WideTree;
+use crate::wide::{LINE, WideTree};
 
 /// Hands out the rays of a batch, each once.
 pub trait Source<Q: BatchQuery> {
@@ -111,6 +112,9 @@ impl<Q: BatchQuery> Source<Q> for FromRoot<'_> {
     }
 }
 
+/// Rays are asked for so many bytes ahead: a packet in empty space takes less time than its rays take to come.
+const AHEAD: usize = 32 * LINE;
+
 /// All rays in order, each from its entry.
 pub struct FromEntry<'a> {
     rays: &'a [Ray],
@@ -176,6 +180,10 @@ impl<Q: BatchQuery> Source<Q> for FromEntry<'_> {
                 match &mut self.search {
                     Search::Path(packets) => {
                         if packets.is_due() {
+                            let ahead = rays.as_ptr().cast::<u8>().wrapping_add(AHEAD);
+                            for line in 0..PACKET * size_of::<Ray>() / LINE {
+                                prefetch_line(ahead.wrapping_add(line * LINE));
+                            }
                             let rays = &rays[..rays.len().min(PACKET)];
                             *left = packets.enter_packet::<L, E>(tree, rays, entries, events);
                             *first = index;

@@ -1,8 +1,9 @@
-//! Particles with lists of segments, as the lanes of a wave take them.
+//! Particles with lists of segments.
 
-use super::{Crossed, CrossingFilter, Encounter, Float, WalkerGeometry, end_of};
-use crate::kernel::{BatchCaster, Before, Crossings, Crowd, Lanes, WAVE, WalkReport, wave_width};
-use crate::ray::Ray;
+use super::passing::Passing;
+use super::stopping::Stopping;
+use super::{Crossed, CrossingFilter, Encounter, Float, WalkerGeometry};
+use crate::kernel::{BatchCaster, Crossings, Known, Lanes, WalkReport, wave_width};
 
 /// A crossing of a particle.
 #[derive(Clone, Copy, Debug)]
@@ -19,28 +20,23 @@ pub struct Record<T> {
 
 /// The particles of a task.
 pub struct Lists<'a, G: WalkerGeometry> {
-    geometry: &'a G,
+    pub geometry: &'a G,
     /// Where the segments of each particle begin, and where the last ones end.
-    offsets: &'a [usize],
-    directions: &'a [[G::Float; 3]],
-    lengths: &'a [G::Float],
-    positions: &'a mut [[G::Float; 3]],
-    stopped: &'a mut [u32],
+    pub offsets: &'a [usize],
+    pub directions: &'a [[G::Float; 3]],
+    pub lengths: &'a [G::Float],
+    pub positions: &'a mut [[G::Float; 3]],
+    pub stopped: &'a mut [u32],
     /// Segments that each particle has behind it.
-    walked: &'a mut [u32],
+    pub walked: &'a mut [u32],
     encounter: Encounter,
     /// Decides which crossings count.
     filter: &'a dyn CrossingFilter,
     /// The index of the first particle among all, as the filter knows them.
     first: usize,
-    /// The particle of each lane.
-    of: [usize; WAVE],
-    /// Where its segment ends.
-    to: [[G::Float; 3]; WAVE],
-    /// The first particle not yet begun.
-    next: usize,
     records: Vec<Record<G::Float>>,
-    invalid: usize,
+    /// Segments without an end.
+    pub invalid: usize,
 }
 
 /// Positions, the triangles at which particles were stopped, and segments walked.
@@ -70,110 +66,58 @@ impl<'a, G: WalkerGeometry> Lists<'a, G> {
             encounter,
             filter,
             first,
-            of: [usize::MAX; WAVE],
-            to: [[G::Float::default(); 3]; WAVE],
-            next: 0,
             records: Vec::new(),
             invalid: 0,
         }
     }
 
-    /// Number of particles.
-    pub fn len(&self) -> usize {
-        self.positions.len()
-    }
-
-    /// All crossings, those of each particle in order, and the number of segments without an end.
-    pub fn into_records(self) -> (Vec<Record<G::Float>>, usize) {
-        (self.records, self.invalid)
-    }
-
-    /// Takes note of what the segment of a lane crosses; true if it stops its particle.
+    /// Takes note of the first of the crossings of a segment that count, up to `most` of them; returns the last one. A
+    /// particle that stood at a face that it passes does not cross it.
     #[inline(always)]
-    fn arrive(&mut self, k: usize, crossed: &[Crossed]) -> bool {
-        let particle = self.of[k];
-        let (from, to) = (self.positions[particle], self.to[k]);
-        let segment = self.walked[particle];
-        let passed = std::mem::replace(&mut self.stopped[particle], u32::MAX);
-        self.walked[particle] += 1;
-        self.positions[particle] = to;
+    pub fn note(
+        &mut self,
+        (particle, segment): (usize, u32),
+        passed: u32,
+        crossed: &[Crossed],
+        most: usize,
+    ) -> Option<Crossed> {
         let (filter, index) = (self.filter, self.first + particle);
         let counts =
             |hit: &&Crossed| !filter.passes(passed, hit.prim_id) && filter.accepts(index, hit);
-        for hit in crossed.iter().filter(counts) {
+        let mut last = None;
+        for hit in crossed.iter().filter(counts).take(most) {
             let length = self.lengths[self.offsets[particle] + segment as usize];
             let t = Float::rounded(hit.share * length.into());
             self.records.push(Record { particle: particle as u32, segment, t, hit: *hit });
-            if self.encounter == Encounter::Stop {
-                let at = |a: usize| {
-                    let (from, to): (f64, f64) = (from[a].into(), to[a].into());
-                    Float::rounded(from + hit.share * (to - from))
-                };
-                self.positions[particle] = std::array::from_fn(at);
-                self.stopped[particle] = hit.prim_id;
-                return true;
-            }
+            last = Some(*hit);
         }
-        false
-    }
-
-    /// The next segment of the particle of a lane.
-    #[inline(always)]
-    fn segment(&mut self, k: usize, query: &mut Crossings<'_, G>) -> Option<Ray> {
-        let particle = self.of[k];
-        let from = self.positions[particle];
-        loop {
-            let at = self.offsets[particle] + self.walked[particle] as usize;
-            if at >= self.offsets[particle + 1] {
-                return None;
-            }
-            let end = end_of(self.geometry, from, self.directions[at], self.lengths[at]);
-            let Some(to) = end else {
-                self.invalid += 1;
-                self.walked[particle] += 1;
-                continue;
-            };
-            if to == from {
-                self.walked[particle] += 1;
-                continue;
-            }
-            query.set(k, from, to);
-            self.to[k] = to;
-            return Some(self.geometry.search_ray(from, to));
-        }
+        last
     }
 }
 
-impl<'a, G: WalkerGeometry> Crowd<Crossings<'a, G>> for Lists<'a, G> {
-    #[inline(always)]
-    fn advance(&mut self, k: usize, query: &mut Crossings<'a, G>, before: Before) -> Option<Ray> {
-        let goes_on = match before {
-            Before::Nothing => false,
-            Before::Missed => !self.arrive(k, &[]),
-            Before::Answered => !self.arrive(k, query.of(k)),
-        };
-        if goes_on && let Some(ray) = self.segment(k, query) {
-            return Some(ray);
-        }
-        while self.next < self.positions.len() {
-            self.of[k] = self.next;
-            self.next += 1;
-            if let Some(ray) = self.segment(k, query) {
-                return Some(ray);
-            }
-        }
-        None
-    }
-}
-
-/// What the particles of a task met, segments without an end, and how the segments went.
+/// The crossings of all particles of a task, those of each segment in order, and the number of segments without an end;
+/// how the segments went.
 pub type Part<T> = ((Vec<Record<T>>, usize), WalkReport);
 
 /// Moves the particles of a task.
 pub fn walk<G: WalkerGeometry>(caster: &BatchCaster<'_>, lists: Lists<'_, G>) -> Part<G::Float> {
-    let (width, mut query) = (lists.len().min(wave_width()), Crossings::new(lists.geometry));
-    let mut lanes = Lanes::new(caster.tree(), width, lists);
-    caster.run_lanes(width, &mut query, &mut lanes);
-    let (lists, report) = lanes.into_parts();
-    (lists.into_records(), report)
+    let (tree, mut query) = (caster.tree(), Crossings::new(lists.geometry));
+    let (lists, report) = match lists.encounter {
+        Encounter::Pass => {
+            let segments = lists.offsets[lists.positions.len()] - lists.offsets[0];
+            let width = segments.min(wave_width());
+            let mut known = Known::new(tree, Passing::new(lists));
+            caster.run_lanes(width, &mut query, &mut known);
+            let (passing, report) = known.into_parts();
+            (passing.lists, report)
+        }
+        Encounter::Stop => {
+            let width = lists.positions.len().min(wave_width());
+            let mut lanes = Lanes::new(tree, width, Stopping::new(lists));
+            caster.run_lanes(width, &mut query, &mut lanes);
+            let (stopping, report) = lanes.into_parts();
+            (stopping.lists, report)
+        }
+    };
+    ((lists.records, lists.invalid), report)
 }

@@ -11,7 +11,9 @@
 
 mod crossing;
 mod lists;
+mod passing;
 mod precision;
+mod stopping;
 
 pub use crossing::Crossed;
 pub(crate) use crossing::crossing;
@@ -132,11 +134,25 @@ pub fn end_of<G: WalkerGeometry>(
     direction: [G::Float; 3],
     length: G::Float,
 ) -> Option<[G::Float; 3]> {
-    let end = |a: usize| from[a].into() + direction[a].into() * length.into();
-    let to: [G::Float; 3] = std::array::from_fn(|a| G::Float::rounded(end(a)));
-    let fits =
-        |p: [G::Float; 3]| geometry.scaled(p.map(Into::into)).iter().all(|x| x.abs() <= G::LARGEST);
-    (length.into() >= 0.0 && fits(from) && fits(to)).then_some(to)
+    let (to, valid) = end_or_not(geometry, from, direction, length);
+    valid.then_some(to)
+}
+
+/// The same, and whether it is one: as a pair, which stays in registers.
+#[inline(always)]
+fn end_or_not<G: WalkerGeometry>(
+    geometry: &G,
+    from: [G::Float; 3],
+    direction: [G::Float; 3],
+    length: G::Float,
+) -> ([G::Float; 3], bool) {
+    let end = |a: usize| G::Float::rounded(from[a].into() + direction[a].into() * length.into());
+    let to = [end(0), end(1), end(2)];
+    let fits = |p: [G::Float; 3]| {
+        let [x, y, z] = geometry.scaled(p.map(Into::into));
+        (x.abs() <= G::LARGEST) & (y.abs() <= G::LARGEST) & (z.abs() <= G::LARGEST)
+    };
+    (to, (length.into() >= 0.0) & fits(from) & fits(to))
 }
 
 /// Particles in a scene of triangles.
@@ -317,11 +333,18 @@ fn gather<T: Float>(parts: &[Part<T>], task: usize, walked: Vec<u32>) -> Events<
     for i in 1..events.offsets.len() {
         events.offsets[i] += events.offsets[i - 1];
     }
-    // The records of a particle are in order, those of several mixed.
+    // Records come as segments are answered, those of a segment together: a particle's are almost in order.
     let mut next = events.offsets.clone();
     for (particle, record) in all() {
-        let at = next[particle];
+        let (first, mut at) = (events.offsets[particle], next[particle]);
         next[particle] += 1;
+        while at > first && events.segment[at - 1] > record.segment {
+            events.segment[at] = events.segment[at - 1];
+            events.t[at] = events.t[at - 1];
+            events.prim_id[at] = events.prim_id[at - 1];
+            events.entering[at] = events.entering[at - 1];
+            at -= 1;
+        }
         events.segment[at] = record.segment;
         events.t[at] = record.t;
         events.prim_id[at] = record.hit.prim_id;

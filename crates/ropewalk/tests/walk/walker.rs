@@ -209,6 +209,44 @@ fn particles_meet_what_the_definition_says() {
 }
 
 /// A box of twelve triangles, fronts outwards.
+/// Long lists, so that segments are looked at in packets and answered out of order: short ones between long ones.
+#[test]
+fn long_lists_come_in_order() {
+    let mut met = 0;
+    for round in 0..3 {
+        let mut draw = Draw::new(900 + round);
+        let geometry = scenes::soup(&mut draw, 200, 0.3);
+        let tree = random_tree(&mut draw, &geometry, TreeShape::default()).unwrap();
+        let wide = WideTree::compile(&tree, &geometry).unwrap();
+        let bounds = geometry.bounds();
+        let low = bounds.min.map(f64::from);
+        let size: [f64; 3] = std::array::from_fn(|a| f64::from(bounds.max[a]) - low[a]);
+        let (mut positions, mut offsets) = (Vec::new(), vec![0]);
+        let (mut directions, mut lengths) = (Vec::new(), Vec::new());
+        for _ in 0..5 {
+            let point = |draw: &mut Draw| {
+                std::array::from_fn(|a| low[a] + size[a] * draw.uniform(0.1, 0.9))
+            };
+            let mut at: [f64; 3] = point(&mut draw);
+            positions.push(at.map(|x| x as f32));
+            for _ in 0..draw.below(1500) {
+                let share = if draw.chance(0.05) { 0.5 } else { 0.004 };
+                let to: [f64; 3] = point(&mut draw);
+                let step: [f64; 3] = std::array::from_fn(|a| share * (to[a] - at[a]));
+                at = std::array::from_fn(|a| at[a] + step[a]);
+                directions.push(step.map(|x| x as f32));
+                lengths.push(1.0);
+            }
+            offsets.push(lengths.len());
+        }
+        met +=
+            check(&geometry, &wide, &Crowd { positions, offsets, directions, lengths }, &|_, _| {
+                true
+            });
+    }
+    assert!(met > 1000, "{met} events");
+}
+
 fn push_box(geometry: &mut Geometry, low: [f32; 3], high: [f32; 3]) {
     let corner = |i: usize| std::array::from_fn(|a| if i >> a & 1 == 1 { high[a] } else { low[a] });
     for [a, b, c, d] in
