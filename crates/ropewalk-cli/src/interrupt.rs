@@ -1,12 +1,12 @@
-//! Ctrl-C and progress bars.
+//! Ctrl-C, SIGTERM and progress bars.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use ropewalk::build::Monitor;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// The flag that Ctrl-C sets; the handler is installed on first use. A second Ctrl-C ends the
-/// process at once.
+/// The flag that Ctrl-C and SIGTERM set; the handlers are installed on first use. A second one ends the
+/// process at once. SIGHUP is left as it is: `nohup` has it ignored.
 pub fn flag() -> Arc<AtomicBool> {
     static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
     FLAG.get_or_init(|| {
@@ -18,6 +18,13 @@ pub fn flag() -> Arc<AtomicBool> {
                 std::process::exit(130);
             }
         });
+        #[cfg(unix)]
+        {
+            use signal_hook::{consts::SIGTERM, flag as signal};
+            // In this order: the first signal finds the flag not set.
+            let _ = signal::register_conditional_shutdown(SIGTERM, 143, Arc::clone(&flag));
+            let _ = signal::register(SIGTERM, Arc::clone(&flag));
+        }
         flag
     })
     .clone()

@@ -26,8 +26,20 @@ pub fn usage(message: impl Into<String>) -> anyhow::Error {
 
 /// Prints the error in one sentence and gives its exit code.
 pub fn fail(error: &anyhow::Error) -> ExitCode {
-    eprintln!("ropewalk: {error:#}");
+    eprintln!("ropewalk: {}", sentence(error));
     ExitCode::from(if error.is::<UsageError>() { 2 } else { 1 })
+}
+
+/// An error with its causes, less those that it names itself.
+fn sentence(error: &anyhow::Error) -> String {
+    error.chain().fold(String::new(), |said, cause| {
+        let cause = cause.to_string();
+        match said.as_str() {
+            "" => cause,
+            said if said.ends_with(&cause) => said.to_owned(),
+            said => format!("{said}: {cause}"),
+        }
+    })
 }
 
 /// Prints text to standard output; a reader that closes it has seen enough.

@@ -237,6 +237,35 @@ fn a_picture_that_cannot_be_written_is_known_before_tracing() {
     assert!(files(folder.path()).is_empty());
 }
 
+/// Options that would do nothing are refused, cameras are named as they were given, causes are said once.
+#[test]
+fn options_of_paths_say_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("four.obj"), FOUR).unwrap();
+    let say = |code: i32, options: &str| {
+        let args = format!("render four.obj --size 8x8 --samples 1 {options}");
+        let output = ropewalk(folder.path(), &args.split(' ').collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(code), "{options}: {}", stderr(&output));
+        stderr(&output)
+    };
+    assert!(say(2, "-o a.png --focus 3").contains("--aperture"));
+    assert!(say(2, "-o a.exr --tone clip").contains("--tone is for PNG"));
+    assert!(say(2, "-o a.exr --exposure 1").contains("--exposure is for PNG"));
+    let same = say(1, "-o a.png --from 7,8,9 --at 7,8,9");
+    assert!(same.contains("from [7.0, 8.0, 9.0] and at [7.0, 8.0, 9.0]"), "{same}");
+    let far = say(1, "-o a.png --from 1e300,0,0 --at 0,0,0");
+    assert!(far.contains("from [1e300, 0.0, 0.0] lies more than"), "{far}");
+    assert_eq!(files(folder.path()), ["four.obj"]);
+    let dark = say(0, "-o a.png --no-sky");
+    assert!(dark.contains("nothing shines"), "{dark}");
+    assert_eq!(say(0, "-o a.png"), "");
+    #[cfg(target_os = "linux")]
+    {
+        let refused = say(1, "-o /proc/a.png");
+        assert_eq!(refused.matches("os error").count(), 1, "{refused}");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn an_interrupt_leaves_the_last_picture_or_none() {
@@ -389,7 +418,7 @@ fn a_turntable_goes_on_where_it_was_interrupted() {
 fn an_interrupt_of_paths_leaves_whole_pictures() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("four.obj"), FOUR).unwrap();
-    let interrupted = |extra: &[&str]| {
+    let interrupted = |signal: &str, extra: &[&str]| {
         let args = ["render", "four.obj", "--size", "300x200", "--samples", "1000000"];
         let child = Command::new(env!("CARGO_BIN_EXE_ropewalk"))
             .current_dir(folder.path())
@@ -398,15 +427,25 @@ fn an_interrupt_of_paths_leaves_whole_pictures() {
             .spawn()
             .unwrap();
         std::thread::sleep(Duration::from_millis(2500));
-        let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        let kill = Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap();
         assert!(kill.success());
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
         assert!(stderr(&output).contains("interrupted"), "{}", stderr(&output));
+        stderr(&output)
     };
-    interrupted(&["--turntable", "2", "-o", "frame.png"]);
+    interrupted("-INT", &["--turntable", "2", "-o", "frame.png"]);
     assert_eq!(files(folder.path()), ["four.obj"]);
-    interrupted(&["-o", "a.png"]);
+    // A later frame that is there counts too.
+    let later = ropewalk(
+        folder.path(),
+        &["render", "four.obj", "--size", "300x200", "--samples", "1", "-o", "frame.0001.png"],
+    );
+    assert!(later.status.success(), "{}", stderr(&later));
+    let said = interrupted("-TERM", &["--turntable", "2", "-o", "frame.png"]);
+    assert!(said.contains("1 of 2 frames are there"), "{said}");
+    std::fs::remove_file(folder.path().join("frame.0001.png")).unwrap();
+    interrupted("-TERM", &["-o", "a.png"]);
     let left = files(folder.path());
     let path = folder.path().join("a.png");
     assert!(left == ["four.obj"] || ropewalk_render::path::is_whole_picture(&path, [300, 200]));

@@ -134,6 +134,10 @@ impl<'a, A: RayCaster> Frame<'a, A> {
         let camera = scene.camera.unwrap_or_else(|| default_camera(&geometry.bounds()));
         let size = settings.checked_size(&camera)?;
         let view = View::new(&camera, size)?;
+        if camera.from.iter().any(|x| x.abs() > f64::from(f32::MAX)) {
+            let what = format!("from {:?} lies beyond 3.4e38, the end of f32", camera.from);
+            return Err(RenderError::Camera { what });
+        }
         check_objects(scene, geometry)?;
         let lighting = Lighting::new(scene, view.eye());
         let max_depth = settings.max_depth;

@@ -56,7 +56,10 @@ impl View {
     /// (and assumes a square picture); that frame is wider by 1/(w - 1), 0.2 % at 512 pixels.
     pub fn new(camera: &Camera, size: [u32; 2]) -> Result<Self, RenderError> {
         let fail = |what: String| Err(RenderError::Camera { what });
-        let Some(forward) = unit(sub(camera.at, camera.from)) else {
+        let apart = sub(camera.at, camera.from);
+        let largest = apart.iter().fold(0.0f64, |a, x| a.max(x.abs()));
+        // Squares may overflow.
+        let Some(forward) = unit(apart).or_else(|| unit(scale(apart, 1.0 / largest))) else {
             return fail(format!(
                 "from {:?} and at {:?} must be two different finite points",
                 camera.from, camera.at
@@ -127,6 +130,7 @@ mod tests {
             Camera { angle: 180.0, ..camera() },
             Camera { angle: f64::NAN, ..camera() },
             Camera { from: [f64::NAN, 0.0, 0.0], ..camera() },
+            Camera { at: [f64::INFINITY, 0.0, 0.0], ..camera() },
         ];
         for camera in bad {
             assert!(matches!(View::new(&camera, [8, 8]), Err(RenderError::Camera { .. })));

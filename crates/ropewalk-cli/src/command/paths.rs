@@ -75,8 +75,8 @@ pub struct Options {
     /// Diameter of the lens in units of the scene
     #[arg(long, value_parser = positive)]
     aperture: Option<f64>,
-    /// Distance in focus in units of the scene; that of the point looked at if not given
-    #[arg(long, value_parser = positive)]
+    /// Distance in focus in units of the scene, needs --aperture; that of the point looked at if not given
+    #[arg(long, value_parser = positive, requires = "aperture")]
     focus: Option<f64>,
     /// Largest luminance of light that bounced; darkens glass and corners, but takes away bright specks
     #[arg(long, value_parser = positive)]
@@ -107,6 +107,12 @@ impl Options {
             (self.clamp.is_some(), "--clamp"),
             (self.turntable.is_some(), "--turntable"),
         ];
+        options.into_iter().find(|(given, _)| *given).map(|(_, name)| name)
+    }
+
+    /// The first option given that changes a PNG alone.
+    fn of_png(&self) -> Option<&'static str> {
+        let options = [(self.exposure.is_some(), "--exposure"), (self.tone.is_some(), "--tone")];
         options.into_iter().find(|(given, _)| *given).map(|(_, name)| name)
     }
 
@@ -225,7 +231,18 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     let picture =
         args.output.clone().unwrap_or_else(|| format!("{}.png", name.replace(':', "_")).into());
     let format = check_image_path(&picture)?;
+    if format == ImageFormat::Exr
+        && let Some(name) = options.of_png()
+    {
+        return Err(usage(format!("{name} is for PNG: an EXR file has the light as it is")));
+    }
     let around = options.surroundings(&stage, up)?;
+    if around.is_dark(&stage) {
+        let scene = &args.scene;
+        eprintln!(
+            "ropewalk: {scene}: nothing shines, the picture will be black; leave out --no-sky"
+        );
+    }
     let camera = options.camera(&stage, args.size, up);
     // Inside, the sky is no measure of what is seen.
     let is_lit_by_sky = matches!(around.backdrop, Backdrop::Sky) && !stage.daylight;
@@ -350,10 +367,12 @@ impl Job {
 
     /// Frames that are there are kept; a frame is written with all its samples or not at all.
     fn turntable(&mut self, camera: &Camera, path: &Path, frames: u32) -> anyhow::Result<()> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("png");
+        let name = |frame: u32| path.with_extension(format!("{frame:04}.{extension}"));
+        let size = self.settings.size;
         for frame in 0..frames {
-            let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("png");
-            let place = path.with_extension(format!("{frame:04}.{extension}"));
-            if is_whole_picture(&place, self.settings.size) {
+            let place = name(frame);
+            if is_whole_picture(&place, size) {
                 self.kept += 1;
                 continue;
             }
@@ -361,7 +380,7 @@ impl Job {
             self.world.turn_sky(self.up, turn);
             let done = self.trace(&orbited(camera, self.up, turn), "frame")?;
             if done.cancelled {
-                let there = frame as usize;
+                let there = (0..frames).filter(|&i| is_whole_picture(&name(i), size)).count();
                 anyhow::bail!(
                     "interrupted; {there} of {frames} frames are there, run again to go on"
                 );

@@ -8,6 +8,7 @@ use super::sight::Sight;
 use super::world::World;
 use crate::error::RenderError;
 use crate::renderer::{Monitor, Progress};
+use crate::view::View;
 use rayon::prelude::*;
 use ropewalk::kernel::BatchCaster;
 use ropewalk::wide::WideTree;
@@ -35,6 +36,9 @@ pub struct PathRender {
     pub cancelled: bool,
 }
 
+/// The largest coordinate of a camera, where the scene is as large as 1 to 2.
+const FARTHEST: f64 = 1e12;
+
 /// Follows paths from `camera` through `world`, whose geometry has been made into `tree`. `each_pass` sees the picture
 /// after every pass and may end the render; what it sees depends on the number of passes alone, not on threads.
 ///
@@ -52,7 +56,15 @@ pub fn trace_paths(
     let mut lens = settings.lens;
     lens.aperture *= world.scale();
     lens.focus = lens.focus.map(|x| x * world.scale());
-    let view = LensView::new(&world.place_camera(camera), &lens, settings.size)?;
+    // Of the camera as it was given, so that errors name its own numbers.
+    View::new(camera, settings.size)?;
+    let placed = world.place_camera(camera);
+    if placed.from.iter().any(|x| x.abs() > FARTHEST) {
+        let from = camera.from;
+        let what = format!("from {from:?} lies more than {FARTHEST:e} times the scene's size away");
+        return Err(RenderError::Camera { what });
+    }
+    let view = LensView::new(&placed, &lens, settings.size)?;
     let mut integrator = Integrator {
         world,
         caster: BatchCaster::new(tree, world.geometry()).with_threads(1),

@@ -55,11 +55,20 @@ impl Surroundings {
     /// What makes a good picture of a stage: a sky unless it has lights of its own and no daylight, and without lights ground unless it has a
     /// camera of its own.
     pub fn of(stage: &Stage, up: Up) -> Surroundings {
-        let shines = stage.materials.iter().any(|m| m.emission.iter().any(|&x| x > 0.0));
-        let lit = shines || !stage.lights.is_empty();
+        let lit = shines(stage);
         let backdrop = if lit && !stage.daylight { Backdrop::None } else { Backdrop::Sky };
         Surroundings { up, backdrop, ground: !lit && stage.camera.is_none() }
     }
+
+    /// True if there is no light, neither from here nor from the stage.
+    pub fn is_dark(&self, stage: &Stage) -> bool {
+        matches!(self.backdrop, Backdrop::None) && !shines(stage)
+    }
+}
+
+/// True if a stage has light of its own.
+fn shines(stage: &Stage) -> bool {
+    !stage.lights.is_empty() || stage.materials.iter().any(|m| m.emission.iter().any(|&x| x > 0.0))
 }
 
 /// A stage made ready for paths. Inside it is moved to the origin and scaled by a power of two, so that meshes of any
