@@ -97,7 +97,7 @@ def test_other_processes(method):
 def test_a_fork_builds_and_asks():
     assert python("""
         import os, numpy as np, ropewalk
-        from multiprocessing import Process
+        from multiprocessing import get_context
         v = np.random.default_rng(0).normal(size=(9000, 3))
         f = np.arange(9000).reshape(-1, 3)
         scene = ropewalk.Scene(v, f, threads=2)
@@ -107,7 +107,7 @@ def test_a_fork_builds_and_asks():
             again = ropewalk.Scene(v, f, threads=2)
             for s in (scene, again):
                 assert (s.closest_hit(o, d, threads=2).t == expected).all()
-        process = Process(target=child)
+        process = get_context("fork").Process(target=child)
         process.start()
         process.join(60)
         assert process.exitcode == 0, process.exitcode

@@ -9,7 +9,7 @@ use super::level::{
     DEPTH_SLACK, Found, Nearest, ROUNDED_DEPTH, ROUNDED_SIZE, Range, Root, Simd, WEIGHT_SLACK,
 };
 use super::near::near;
-use super::slot::{Loaded, Slot, TINY, later};
+use super::slot::{Loaded, Slot, TINY};
 use super::vicinity::Cells;
 use crate::ray::Ray;
 use crate::wide::{Block, ID_MASK, ORDER, SIDES_BOTH, Treelet, WIDTH};
@@ -49,7 +49,7 @@ impl Simd for Scalar {
                 }
             }
             let code = treelet.child[packed as usize & 7];
-            if code != 0 && enter <= later(exit) {
+            if code != 0 && enter <= exit + slot.slack {
                 slot.code[sp] = code;
                 slot.enter[sp] = enter;
                 slot.exit[sp] = exit;
@@ -72,7 +72,7 @@ impl Simd for Scalar {
                 enter = if first > enter { first } else { enter };
                 exit = if last < exit { last } else { exit };
             }
-            if code != 0 && enter <= later(exit) {
+            if code != 0 && enter <= exit + slot.slack {
                 (slot.code[sp], slot.enter[sp], slot.exit[sp]) = (code, enter, exit);
                 sp += 1;
             }

@@ -71,7 +71,8 @@ pub unsafe fn single<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
         if count > 0 {
             events.leaf();
         }
-        for line in (first..first + count * BLOCK_LINES).step_by(BLOCK_LINES) {
+        let mut line = first;
+        for _ in 0..count {
             events.block();
             // SAFETY: the codes of a tree lead to its blocks; the rest passed on to the caller.
             unsafe {
@@ -84,6 +85,7 @@ pub unsafe fn single<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
                     }
                 }
             }
+            line += BLOCK_LINES;
         }
         if slot.pop(Q::ANY) {
             return true;

@@ -18,12 +18,6 @@ pub fn later(t: f32) -> f32 {
     t + t.abs() * INTERVAL_SLACK
 }
 
-/// A parameter made smaller by [`INTERVAL_SLACK`].
-#[inline(always)]
-pub fn earlier(t: f32) -> f32 {
-    t - t.abs() * INTERVAL_SLACK
-}
-
 /// See [`Slot::near_zero`].
 pub const NEAR_ZERO: f32 = 1.0 / (1u64 << 36) as f32;
 
@@ -100,13 +94,19 @@ pub struct Slot {
     pub sp: u32,
     /// True if a direction component is zero.
     pub may_lie_in_plane: bool,
+    /// By how much an interval may end before it begins and still be one: [`INTERVAL_SLACK`] of the largest
+    /// parameter at the ends of the root's interval. Those of cells lie between them where they matter.
+    pub slack: f32,
+    /// How far beyond the limit a cell must begin to be left out with all that follow: `near_zero`, the slack, and
+    /// once more the slack, since what follows may begin by so much earlier.
+    pub past: f32,
     /// Codes of the cells still to visit.
     pub code: [u32; STACK],
     /// Where the ray enters them.
     pub enter: [f32; STACK],
     /// Where it leaves them.
     pub exit: [f32; STACK],
-    _pad: [u32; 11],
+    _pad: [u32; 9],
 }
 
 const _: () = assert!(size_of::<Slot>() / 64 % 2 == 1);
@@ -132,10 +132,12 @@ impl Slot {
             flips: Flips::new(0),
             sp: 0,
             may_lie_in_plane: false,
+            slack: 0.0,
+            past: 0.0,
             code: [0; STACK],
             enter: [0.0; STACK],
             exit: [0.0; STACK],
-            _pad: [0; 11],
+            _pad: [0; 9],
         }
     }
 
@@ -209,7 +211,7 @@ impl Slot {
             below = self.skip_behind(below);
         }
         self.sp = below as u32;
-        let behind = earlier(self.enter[below]) - self.near_zero > self.limit;
+        let behind = self.enter[below] - self.past > self.limit;
         (below == 0) | (!any & behind) | (any & (self.best_id != u32::MAX))
     }
 
@@ -218,7 +220,7 @@ impl Slot {
     #[cold]
     #[inline(never)]
     fn skip_behind(&self, mut below: usize) -> usize {
-        while below > 0 && earlier(self.enter[below]) - self.near_zero > self.limit {
+        while below > 0 && self.enter[below] - self.past > self.limit {
             below -= 1;
         }
         below
@@ -231,6 +233,8 @@ impl Slot {
         self.code[1] = root;
         self.enter[1] = enter;
         self.exit[1] = exit;
+        self.slack = INTERVAL_SLACK * enter.abs().max(exit.abs());
+        self.past = self.near_zero + 2.0 * self.slack;
         self.sp = 1;
     }
 

@@ -10,7 +10,7 @@
 #![allow(unsafe_code)]
 
 use super::level::{DEPTH_SLACK, ROUNDED_DEPTH, ROUNDED_SIZE, Root, WEIGHT_SLACK};
-use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
+use super::slot::{EDGE_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
 use super::vicinity::Cells;
 use crate::ray::Ray;
 use crate::wide::{AXIS_SHIFTS, Block, Flips, ORDER, Treelet, WIDTH};
@@ -170,8 +170,7 @@ pub unsafe fn children<M: Manner>(slot: &Slot, treelet: &Treelet, sp: usize) -> 
         let enter = M::max::<0x55>(enter, t2);
         let exit = M::min::<0xAA>(exit, t2);
 
-        let size = _mm256_andnot_ps(SIGN, exit);
-        let widened = _mm256_fmadd_ps(size, _mm256_set1_ps(INTERVAL_SLACK), exit);
+        let widened = _mm256_add_ps(exit, _mm256_set1_ps(slot.slack));
         Children { code: children, enter, exit, widened }
     }
 }
@@ -196,8 +195,7 @@ pub unsafe fn cells(slot: &Slot, cells: &Cells) -> Children {
             enter = _mm256_max_ps(_mm256_mul_ps(_mm256_sub_ps(first, origin), inv), enter);
             exit = _mm256_min_ps(_mm256_mul_ps(_mm256_sub_ps(last, origin), inv), exit);
         }
-        let size = _mm256_andnot_ps(SIGN, exit);
-        let widened = _mm256_fmadd_ps(size, _mm256_set1_ps(INTERVAL_SLACK), exit);
+        let widened = _mm256_add_ps(exit, _mm256_set1_ps(slot.slack));
         let code = _mm256_load_si256(cells.code.as_ptr().cast());
         Children { code, enter, exit, widened }
     }
