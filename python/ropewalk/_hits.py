@@ -32,23 +32,26 @@ class _Surface:
     def _ray_ids(self) -> NDArray[np.int64] | None:
         return None
 
-    def _look(self, what: str) -> NDArray[Any]:
-        kept: NDArray[Any] | None = getattr(self, f"_{what}", None)
-        if kept is not None:
-            return kept
-        assert self._core is not None and self._rays is not None
-        t, prim, geom = np.ravel(self.t), np.ravel(self.prim_id), np.ravel(self.geom_id)
-        values, lost = self._core.surface(
-            what, self._rays, t, prim, geom, self._threads, self._ray_ids()
-        )
-        if lost:
-            raise RopewalkError(
-                f"{lost} of the hits are not on their rays any more: origins, directions or results "
-                f"were written to after the query; read .{what} before, or hand over copies"
+    def _look(self, *what: str) -> list[NDArray[Any]]:
+        """Surface data by name, all that is not yet known in one pass over the hits."""
+        kept: dict[str, Any] = {name: getattr(self, f"_{name}", None) for name in what}
+        missing = [name for name, values in kept.items() if values is None]
+        if missing:
+            assert self._core is not None and self._rays is not None
+            t, prim, geom = np.ravel(self.t), np.ravel(self.prim_id), np.ravel(self.geom_id)
+            found, lost = self._core.surface(
+                missing, self._rays, t, prim, geom, self._threads, self._ray_ids()
             )
-        values = values.reshape(*self.t.shape, values.shape[1])
-        setattr(self, f"_{what}", values)
-        return values
+            if lost:
+                raise RopewalkError(
+                    f"{lost} of the hits are not on their rays any more: origins, directions or results "
+                    f"were written to after the query; read .{missing[0]} before, or hand over copies"
+                )
+            for name, values in zip(missing, found):
+                kept[name] = values.reshape(*self.t.shape, values.shape[1])
+                if name in _SURFACE:
+                    setattr(self, f"_{name}", kept[name])
+        return [kept[name] for name in what]
 
     @property
     def uv(self) -> NDArray[Any]:
@@ -60,7 +63,7 @@ class _Surface:
         ``(1 - v) * v0 + u * v2 + (v - u) * v3``. Both are 0 on spheres, cones, polygons and patches. Worked out
         when first asked for, from the arrays of the query.
         """
-        return self._look("uv")
+        return self._look("uv")[0]
 
     @property
     def normal(self) -> NDArray[Any]:
@@ -69,7 +72,7 @@ class _Surface:
         They point to the side from which the vertices run counter-clockwise, whichever side was hit; of a quad that
         is not flat it is the triangle's that was hit. Those of spheres and cones point outwards.
         """
-        return self._look("normal")
+        return self._look("normal")[0]
 
     @property
     def position(self) -> NDArray[Any]:
@@ -78,12 +81,11 @@ class _Surface:
         On triangles and quads from their vertices, which is nearer to the surface than ``origin + t * direction`` in
         float32; worked out in float64 and rounded once.
         """
-        return self._look("position")
+        return self._look("position")[0]
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickled without the scene: surface data is worked out first."""
-        for what in _SURFACE:
-            self._look(what)
+        self._look(*_SURFACE)
         names = [name for kind in type(self).__mro__ for name in getattr(kind, "__slots__", ())]
         state = {name: getattr(self, name) for name in names if hasattr(self, name)}
         return {**state, "_core": None, "_rays": None}

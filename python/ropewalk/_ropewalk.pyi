@@ -160,14 +160,14 @@ class DoubleCore:
     ) -> tuple[_I64, _F64, _I32, _I32, int, int]: ...
     def surface(
         self,
-        what: str,
+        what: list[str],
         rays: DoubleRays,
         t: _F64,
         prim: _I32,
         geom: _I32,
         threads: int,
         ray: _I64 | None = None,
-    ) -> tuple[_F64, int]: ...
+    ) -> tuple[list[_F64], int]: ...
 
 @final
 class Core:
@@ -223,14 +223,14 @@ class Core:
     ) -> tuple[_I64, _F32, _I32, _I32, int, int]: ...
     def surface(
         self,
-        what: str,
+        what: list[str],
         rays: Rays,
         t: _F32,
         prim: _I32,
         geom: _I32,
         threads: int,
         ray: _I64 | None = None,
-    ) -> tuple[_F32, int]: ...
+    ) -> tuple[list[_F32], int]: ...
     def engine_seconds(self, query: str, rays: Rays) -> float: ...
 
 @final

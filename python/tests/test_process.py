@@ -337,8 +337,8 @@ def test_a_panic_becomes_an_exception():
     core = Rays(5, zeros, zeros, one, one)
     short = np.zeros(2, np.int32)
     with pytest.raises(ropewalk.RopewalkError):
-        SCENE._core.surface("uv", core, zeros, short, short, 1)
-    _, lost = SCENE._core.surface("uv", core, zeros, *[np.full(3, 2**31 - 1, np.int32)] * 2, 1,
+        SCENE._core.surface(["uv"], core, zeros, short, short, 1)
+    _, lost = SCENE._core.surface(["uv"], core, zeros, *[np.full(3, 2**31 - 1, np.int32)] * 2, 1,
                                   np.array([0, -1, 2**62]))
     assert lost == 0
 

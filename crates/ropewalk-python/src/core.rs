@@ -6,11 +6,11 @@ use crate::figures::Build;
 use crate::meshes::{Given, Mesh, geometry_of};
 use crate::plan::{Plan, Watch, left_for_build, plan_of, sample};
 use crate::rays::{Invalid, Rays, View, one};
-use crate::surface::{self, Surface};
+use crate::surface::{self, Asked, Looked};
 use crate::tasks::{block, blocks, checked, split, total, zeros};
 use crate::walker::cell;
 use crate::{state, work};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use ropewalk::build::{BuildSettings, CostChoice, Preset};
@@ -26,7 +26,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Rays that one task interleaves and traces: half a megabyte.
-const BLOCK: usize = 16_384;
+pub const BLOCK: usize = 16_384;
 
 /// The same over trees of at least [`LARGE_TREE`] bytes: the engine sorts many incoherent rays there.
 const LARGE_BLOCK: usize = 1 << 18;
@@ -365,54 +365,42 @@ impl Core {
         Ok((offsets.into_pyarray(py), t, prim, geom, invalid.count, invalid.first))
     }
 
-    /// Surface coordinates, unit normals or positions of hits, by `what`, and how many of the hits
-    /// are none: rays have been changed since. `ray` names the ray of each hit, or each ray has one.
+    /// Surface coordinates, unit normals, positions or cross products of edges of hits, by `what`, an array each, and how
+    /// many of the hits are none: rays have been changed since. `ray` names the ray of each hit, or each ray has one.
     #[pyo3(signature = (what, rays, t, prim, geom, threads, ray=None))]
     fn surface<'py>(
         &self,
         py: Python<'py>,
-        what: &str,
+        what: Vec<String>,
         rays: &Rays,
         t: PyReadonlyArray1<'py, f32>,
         prim: PyReadonlyArray1<'py, i32>,
         geom: PyReadonlyArray1<'py, i32>,
         threads: usize,
         ray: Option<PyReadonlyArray1<'py, i64>>,
-    ) -> PyResult<(Bound<'py, PyArray2<f32>>, usize)> {
+    ) -> PyResult<(surface::Arrays<'py, f32>, usize)> {
         let arrays = rays.borrow(py)?;
         let view = arrays.view()?;
         let (t, prim, geom) = (t.as_slice()?, prim.as_slice()?, geom.as_slice()?);
         let ray = ray.as_ref().map(|ray| ray.as_slice()).transpose()?;
         let n = t.len();
-        let surface = Surface::named(what);
         let rows = ray.map_or(view.count, <[i64]>::len);
         if prim.len() != n || geom.len() != n || rows != n {
             return Err(error::argument("hits", None, "arrays of hits differ in length".into()));
         }
-        let width = surface.width();
-        let mut values = zeros::<f32>(n * width)?;
-        let block = block(n, threads, BLOCK);
-        let tasks = blocks(n, block).zip(values.chunks_mut(block * width)).collect();
-        let look = |(range, values): (Range<usize>, &mut [f32])| {
-            let mut lost = 0;
-            for (i, value) in range.zip(values.chunks_exact_mut(width)) {
-                value.fill(f32::NAN);
-                let Some(face) = self.faces.face(prim[i], geom[i]) else { continue };
-                let ray = ray.map_or(i, |ray| ray[i] as usize);
-                let line = (ray < view.count).then(|| view.line(ray));
-                let found = line.is_some_and(|(origin, dir)| {
-                    let ray = Ray { origin, dir, t_min: t[i], t_max: t[i] };
-                    self.faces.primitives(face).any(|prim| {
-                        let on = (prim, self.faces.part(prim), view.sides);
-                        surface::look(&self.geometry, surface, &ray, on, value)
-                    })
-                });
-                lost += usize::from(!found);
-            }
-            lost
-        };
-        let lost = work::for_each(py, threads, tasks, look)?.into_iter().sum();
-        Ok((values.into_pyarray(py).reshape([n, width])?, lost))
+        surface::gather(py, (n, threads, f32::NAN), &Asked::named(&what), |i, values| {
+            let Some(face) = self.faces.face(prim[i], geom[i]) else { return Looked::Miss };
+            let ray = ray.map_or(i, |ray| ray[i] as usize);
+            let line = (ray < view.count).then(|| view.line(ray));
+            let found = line.is_some_and(|(origin, dir)| {
+                let ray = Ray { origin, dir, t_min: t[i], t_max: t[i] };
+                self.faces.primitives(face).any(|prim| {
+                    let on = (prim, self.faces.part(prim), view.sides);
+                    surface::look(&self.geometry, &ray, on, values)
+                })
+            });
+            if found { Looked::Found } else { Looked::Lost }
+        })
     }
 
     /// Seconds of this thread's CPU that the engine itself takes for the batch, rays interleaved and room

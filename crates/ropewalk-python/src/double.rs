@@ -6,7 +6,7 @@ use crate::faces::{Faces, MeshFaces, Part, once};
 use crate::figures::Build;
 use crate::plan::{Plan, Watch, left_for_build, plan_of};
 use crate::rays::{Arrays, Invalid, View, one};
-use crate::surface::Surface;
+use crate::surface::{self, Asked, Looked, Surface, Values};
 use crate::tasks::{block, blocks, checked, split, total, zeros};
 use crate::work;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
@@ -513,50 +513,36 @@ impl DoubleCore {
         Ok((offsets.into_pyarray(py), t, prim, geom, invalid.count, invalid.first))
     }
 
-    /// Surface coordinates, unit normals or positions of hits, by `what`, and how many of the hits
-    /// are none: rays have been changed since. `ray` names the ray of each hit, or each ray has one.
+    /// Surface coordinates, unit normals, positions or cross products of edges of hits, by `what`, an array each, and how
+    /// many of the hits are none: rays have been changed since. `ray` names the ray of each hit, or each ray has one.
     #[pyo3(signature = (what, rays, t, prim, geom, threads, ray=None))]
     fn surface<'py>(
         &self,
         py: Python<'py>,
-        what: &str,
+        what: Vec<String>,
         rays: &DoubleRays,
         t: PyReadonlyArray1<'py, f64>,
         prim: PyReadonlyArray1<'py, i32>,
         geom: PyReadonlyArray1<'py, i32>,
         threads: usize,
         ray: Option<PyReadonlyArray1<'py, i64>>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, usize)> {
+    ) -> PyResult<(surface::Arrays<'py, f64>, usize)> {
         let arrays = rays.0.borrow(py)?;
         let view = arrays.view()?;
         let (t, prim, geom) = (t.as_slice()?, prim.as_slice()?, geom.as_slice()?);
         let ray = ray.as_ref().map(|ray| ray.as_slice()).transpose()?;
         let n = t.len();
-        let surface = Surface::named(what);
         let rows = ray.map_or(view.count, <[i64]>::len);
         if prim.len() != n || geom.len() != n || rows != n {
             return Err(error::argument("hits", None, "arrays of hits differ in length".into()));
         }
-        let width = surface.width();
-        let mut values = zeros::<f64>(n * width)?;
-        let block = block(n, threads, BLOCK);
-        let tasks = blocks(n, block).zip(values.chunks_mut(block * width)).collect();
-        let look = |(range, values): (Range<usize>, &mut [f64])| {
-            let mut lost = 0;
-            for (i, value) in range.zip(values.chunks_exact_mut(width)) {
-                value.fill(f64::NAN);
-                let Some(face) = self.faces.face(prim[i], geom[i]) else { continue };
-                let ray = ray.map_or(i, |ray| ray[i] as usize);
-                let ray = (ray < view.count).then(|| ray_of(&view, ray).with_range(t[i], t[i]));
-                let found = ray.is_some_and(|ray| {
-                    self.look(surface, (face, geom[i], view.sides), &ray, value)
-                });
-                lost += usize::from(!found);
-            }
-            lost
-        };
-        let lost = work::for_each(py, threads, tasks, look)?.into_iter().sum();
-        Ok((values.into_pyarray(py).reshape([n, width])?, lost))
+        surface::gather(py, (n, threads, f64::NAN), &Asked::named(&what), |i, values| {
+            let Some(face) = self.faces.face(prim[i], geom[i]) else { return Looked::Miss };
+            let ray = ray.map_or(i, |ray| ray[i] as usize);
+            let ray = (ray < view.count).then(|| ray_of(&view, ray).with_range(t[i], t[i]));
+            let found = ray.is_some_and(|ray| self.look((face, geom[i], view.sides), &ray, values));
+            if found { Looked::Found } else { Looked::Lost }
+        })
     }
 }
 
@@ -661,10 +647,9 @@ impl DoubleCore {
     /// not hit the face there on a side that counts.
     fn look(
         &self,
-        surface: Surface,
         (face, geom, sides): (u32, i32, Sides),
         ray: &DoubleRay,
-        value: &mut [f64],
+        values: &mut Values<'_, '_, f64>,
     ) -> bool {
         let (object, transform, face, ray, faces) = match &self.held {
             Held::Meshes(object, _) => (object, None, face, *ray, Some(&*self.faces)),
@@ -682,22 +667,29 @@ impl DoubleCore {
             .into_iter()
             .find_map(|prim| Some((prim, object.geometry.intersect_on(prim, &ray, sides)?)));
         let Some((prim, hit)) = hit else { return false };
-        match surface {
+        // What is hit is a triangle of the geometry.
+        let (Some(corners), Some(normal)) =
+            (object.geometry.triangle(prim), object.geometry.normal(prim))
+        else {
+            return false;
+        };
+        values.write(|surface| match surface {
             Surface::Coordinates => {
                 let part = faces.map_or(Part::Whole, |faces| faces.part(prim));
-                value.copy_from_slice(&part.coordinates([hit.u, hit.v]));
+                let [u, v] = part.coordinates([hit.u, hit.v]);
+                [u, v, 0.0]
             }
-            Surface::Normal => {
-                let Some(n) = object.geometry.normal(prim) else { return false };
-                value.copy_from_slice(&transform.map_or(n, |transform| transform.normal(n)));
-            }
+            Surface::Normal => transform.map_or(normal, |transform| transform.normal(normal)),
             Surface::Position => {
-                let Some([a, b, c]) = object.geometry.triangle(prim) else { return false };
+                let [a, b, c] = corners;
                 let p =
                     std::array::from_fn(|i| a[i] + hit.u * (b[i] - a[i]) + hit.v * (c[i] - a[i]));
-                value.copy_from_slice(&transform.map_or(p, |transform| transform.point(p)));
+                transform.map_or(p, |transform| transform.point(p))
             }
-        }
+            Surface::Cross => {
+                surface::cross(corners.map(|p| transform.map_or(p, |transform| transform.point(p))))
+            }
+        });
         true
     }
 

@@ -171,13 +171,15 @@ class RaycastingScene:
         """
         o, d = _rays(rays)
         hits = self._meshes.scene().closest_hit(o, d, threads=as_threads(nthreads))
-        hit = hits.hit[..., None]
+        uv, normal = hits._look("uv", "normal")
+        missed = ~hits.hit
+        uv[missed] = normal[missed] = 0
         return {
             "t_hit": _tensor(hits.t),
             "geometry_ids": _ids(hits.geom_id),
             "primitive_ids": _ids(hits.prim_id),
-            "primitive_uvs": _tensor(np.where(hit, hits.uv, 0), np.float32),
-            "primitive_normals": _tensor(np.where(hit, hits.normal, 0), np.float32),
+            "primitive_uvs": _tensor(uv),
+            "primitive_normals": _tensor(normal),
         }
 
     def test_occlusions(

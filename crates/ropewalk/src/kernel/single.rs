@@ -19,7 +19,7 @@ use super::level::{Root, Simd};
 use super::query::BatchQuery;
 use super::slot::{Loaded, Slot};
 use crate::wide::{BLOCK_LINES, LEAF, Treelet, code_line, code_offset};
-use std::cell::RefCell;
+use std::cell::{Cell, UnsafeCell};
 
 /// Puts ray 0 to `query` in `slot`, whose state then holds the answer; false if the ray cannot hit
 /// anything, so that the state means nothing.
@@ -93,13 +93,35 @@ pub unsafe fn single<L: Simd, Q: BatchQuery, E: Events, const SHAPES: bool>(
     }
 }
 
+/// A slot that is lent out once at a time.
+struct Kept {
+    lent: Cell<bool>,
+    slot: UnsafeCell<Slot>,
+}
+
+/// Takes the slot back, also if the work panics.
+struct Loan<'a>(&'a Cell<bool>);
+
+impl Drop for Loan<'_> {
+    fn drop(&mut self) {
+        self.0.set(false);
+    }
+}
+
 /// Lends out the slot that a thread keeps; a filter that casts rays itself gets a new one.
+#[inline(always)]
 pub fn with_slot<T>(work: impl FnOnce(&mut Slot) -> T) -> T {
     thread_local! {
-        static SLOT: RefCell<Slot> = const { RefCell::new(Slot::new()) };
+        static KEPT: Kept =
+            const { Kept { lent: Cell::new(false), slot: UnsafeCell::new(Slot::new()) } };
     }
-    SLOT.with(|slot| match slot.try_borrow_mut() {
-        Ok(mut slot) => work(&mut slot),
-        Err(_) => work(&mut Slot::new()),
-    })
+    // Only the address is taken in the closure, so that the work is not called through it.
+    // SAFETY: what a thread keeps without a destructor is there until the thread ends.
+    let kept = unsafe { &*KEPT.with(std::ptr::from_ref) };
+    if kept.lent.replace(true) {
+        return work(&mut Slot::new());
+    }
+    let _loan = Loan(&kept.lent);
+    // SAFETY: it is lent to nobody else: only this thread sees it, and the mark was not set.
+    work(unsafe { &mut *kept.slot.get() })
 }

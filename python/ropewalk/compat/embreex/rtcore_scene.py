@@ -106,24 +106,17 @@ class EmbreeScene:
         tfar = np.where(hit, hits.t, far)
         if not output:
             return tfar
-        uv = np.where(hit[:, None], hits.uv, np.float32(0))
+        uv, normals = hits._look("uv", "cross")
+        missed = ~hit
+        uv[missed] = normals[missed] = 0
         return {
             "u": np.ascontiguousarray(uv[:, 0]),
             "v": np.ascontiguousarray(uv[:, 1]),
-            "Ng": self._normals(hits.geom_id, hits.prim_id, hit),
+            "Ng": normals,
             "tfar": tfar,
             "primID": hits.prim_id,
             "geomID": hits.geom_id,
         }
-
-    def _normals(
-        self, geom: NDArray[np.int32], prim: NDArray[np.int32], hit: NDArray[np.bool_]
-    ) -> NDArray[np.float32]:
-        """Cross products of the edges of triangles that were hit."""
-        corners = self._meshes.triangles(geom[hit], prim[hit])
-        normals = np.zeros((len(hit), 3), np.float32)
-        normals[hit] = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        return normals
 
 
 def _rows(value: ArrayLike, argument: str) -> np.ndarray:
