@@ -25,6 +25,9 @@ use std::cell::RefCell;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+/// Primitives of so many hits ahead are asked for.
+const AHEAD: usize = 8;
+
 /// Rays that one task interleaves and traces: half a megabyte.
 pub const BLOCK: usize = 16_384;
 
@@ -389,6 +392,13 @@ impl Core {
             return Err(error::argument("hits", None, "arrays of hits differ in length".into()));
         }
         surface::gather(py, (n, threads, f32::NAN), &Asked::named(&what), |i, values| {
+            // Hits are all over the scene, and what is worked out about one leaves time for others to come from memory.
+            let ahead = i + AHEAD;
+            if ahead < n
+                && let Some(face) = self.faces.face(prim[ahead], geom[ahead])
+            {
+                self.geometry.prefetch(self.faces.primitives(face).start);
+            }
             let Some(face) = self.faces.face(prim[i], geom[i]) else { return Looked::Miss };
             let ray = ray.map_or(i, |ray| ray[i] as usize);
             let line = (ray < view.count).then(|| view.line(ray));

@@ -5,6 +5,7 @@ mod stored;
 pub(crate) use stored::{BACK, FRONT, StoredTriangles, TRIANGLE_BYTES};
 
 use crate::aabb::Aabb;
+use crate::kernel::prefetch_line;
 use crate::primitive::{Crossing, Primitive, Shape, ShapeError, Sides, SurfaceNormals, Triangle};
 use crate::ray::{Hit, PreparedRay, Ray, Shear};
 use crate::touch;
@@ -189,6 +190,16 @@ impl Geometry {
         let stored = self.stored.as_ref();
         let shapes = stored.map_or(&self.shapes[..], |stored| stored.shapes());
         &shapes[prim_id as usize]
+    }
+
+    /// Asks memory for a primitive that is looked at soon; one that is not there does no harm.
+    #[inline]
+    pub fn prefetch(&self, prim_id: u32) {
+        if self.stored.is_none() {
+            let shape = self.shapes.as_ptr().wrapping_add(prim_id as usize).cast::<u8>();
+            prefetch_line(shape);
+            prefetch_line(shape.wrapping_add(size_of::<Shape>() - 1));
+        }
     }
 
     /// The triangle of a primitive; `None` if it is of another kind or there is none of this number.
