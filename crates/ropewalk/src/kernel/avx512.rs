@@ -30,6 +30,12 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    unsafe fn miss_box(rays: &[Ray], index: &[u32; WIDTH], root: &Root) -> u32 {
+        // SAFETY: passed on to the caller.
+        unsafe { x86::miss_box(rays, index, root) }
+    }
+
+    #[inline(always)]
     unsafe fn step(slot: &mut Slot, treelet: &Treelet, sp: usize) -> usize {
         debug_assert!(sp + WIDTH <= super::slot::STACK);
         // SAFETY: the caller vouches for the features; the stores lie in the slot (sp + 8 entries

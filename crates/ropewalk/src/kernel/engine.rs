@@ -518,7 +518,7 @@ impl<'a> Engine<'a> {
 
     /// Rays from the root, or from cells near them where any hit ends them.
     fn rays_from_root<'r, Q: BatchQuery>(&self, rays: &'r [Ray], order: &'r [u32]) -> FromRoot<'r> {
-        let source = FromRoot::new(rays, order);
+        let source = FromRoot::new(self.tree, rays, order);
         let near = Q::ANY && !Q::ROUNDED && self.start == Start::Automatic;
         if near { source.with_vicinity(self.tree) } else { source }
     }

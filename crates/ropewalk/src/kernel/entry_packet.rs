@@ -197,9 +197,12 @@ impl Packets {
     /// True if the next rays are to be searched for in a packet, else one of them by itself.
     #[inline(always)]
     pub fn is_due(&mut self) -> bool {
-        let due = self.single == 0;
-        self.single -= u32::from(!due);
-        due
+        // Written with a branch: without one, the optimiser of Rust 1.95 loses the count where this is asked in a loop.
+        if self.single == 0 {
+            return true;
+        }
+        self.single -= 1;
+        false
     }
 
     /// The entry of one ray; see [`Path::enter`].

@@ -173,6 +173,15 @@ pub trait Simd: Locate {
     /// See the trait.
     unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loaded;
 
+    /// Of eight rays those of which [`Simd::load`] would say that they miss, or some of them; `index` says which rays.
+    ///
+    /// # Safety
+    /// See the trait.
+    #[inline(always)]
+    unsafe fn miss_box(_rays: &[Ray], _index: &[u32; WIDTH], _root: &Root) -> u32 {
+        0
+    }
+
     /// Replaces the top of the slot's stack by the children that the ray's interval reaches,
     /// nearest on top, and returns the new stack pointer.
     ///

@@ -5,14 +5,14 @@
 use super::entry::Climb;
 use super::entry_packet::{PACKET, Packets};
 use super::events::Events;
-use super::level::Simd;
+use super::level::{Root, Simd};
 use super::prefetch_line;
 use super::query::BatchQuery;
 use super::slot::Slot;
 use super::vicinity::Vicinity;
 use crate::point::Cell;
 use crate::ray::Ray;
-use crate::wide::{LINE, WideTree};
+use crate::wide::{LINE, WIDTH, WideTree};
 
 /// Hands out the rays of a batch, each once.
 pub trait Source<Q: BatchQuery> {
@@ -53,18 +53,70 @@ pub trait Source<Q: BatchQuery> {
     }
 }
 
-/// Rays from the root.
+/// So many rays are looked at ahead of their turn.
+const AHEAD_RAYS: usize = 64;
+
+/// Looking ahead pays where it leaves out at least one ray of so many; if it does not, it is tried again after
+/// [`RESTS`] times as many rays.
+const PAYING: usize = 8;
+
+/// See [`PAYING`].
+const RESTS: u32 = 15;
+
+/// Rays from the root. Those that pass the scene's box by are left out eight at a time, as long as that pays: which of
+/// them do cannot be predicted, and putting one into a slot takes as long as a step.
 pub struct FromRoot<'a> {
     rays: &'a [Ray],
     /// Indices of the rays still to come.
     order: &'a [u32],
+    root: Root,
+    /// Indices of the rays that come next: `next..len` are left.
+    ready: [u32; AHEAD_RAYS],
+    next: usize,
+    len: usize,
+    /// So many times the next rays are taken without a look.
+    rests: u32,
     vicinity: Option<Vicinity>,
 }
 
 impl<'a> FromRoot<'a> {
     /// The rays with these indices, in this order.
-    pub fn new(rays: &'a [Ray], order: &'a [u32]) -> Self {
-        FromRoot { rays, order, vicinity: None }
+    pub fn new(tree: &WideTree, rays: &'a [Ray], order: &'a [u32]) -> Self {
+        let root = Root::new(tree.bounds(), tree.root());
+        let ready = [0; AHEAD_RAYS];
+        FromRoot { rays, order, root, ready, next: 0, len: 0, rests: 0, vicinity: None }
+    }
+
+    /// Gets the next rays ready.
+    ///
+    /// # Safety
+    /// As for [`Source::next`].
+    #[inline(always)]
+    unsafe fn look_ahead<L: Simd, Q: BatchQuery>(&mut self, query: &mut Q) {
+        let (order, rest) = self.order.split_at(self.order.len().min(AHEAD_RAYS));
+        (self.order, self.next, self.len) = (rest, 0, 0);
+        if self.rests > 0 {
+            self.rests -= 1;
+            self.len = order.len();
+            self.ready[..order.len()].copy_from_slice(order);
+            return;
+        }
+        let mut index = [0; WIDTH];
+        for eight in order.chunks(WIDTH) {
+            // The rest is left from before, or the first ray: looked at in vain.
+            index[..eight.len()].copy_from_slice(eight);
+            // SAFETY: passed on to the caller.
+            let misses = unsafe { L::miss_box(self.rays, &index, &self.root) };
+            for (lane, &index) in eight.iter().enumerate() {
+                self.ready[self.len % AHEAD_RAYS] = index;
+                self.len += 1 - (misses >> lane & 1) as usize;
+                // Without a branch: those that are not left out are answered later on.
+                query.miss(index as usize);
+            }
+        }
+        if (order.len() - self.len) * PAYING < order.len() {
+            self.rests = RESTS;
+        }
     }
 
     /// Short ones that any hit ends may start from cells near them.
@@ -88,13 +140,20 @@ impl<Q: BatchQuery> Source<Q> for FromRoot<'_> {
     unsafe fn next<L: Simd, E: Events>(
         &mut self,
         _k: usize,
-        tree: &WideTree,
-        _query: &mut Q,
+        _tree: &WideTree,
+        query: &mut Q,
         _events: &mut E,
     ) -> Option<(usize, u32)> {
-        let (&index, rest) = self.order.split_first()?;
-        self.order = rest;
-        Some((index as usize, tree.root()))
+        while self.next == self.len {
+            if self.order.is_empty() {
+                return None;
+            }
+            // SAFETY: passed on to the caller.
+            unsafe { self.look_ahead::<L, Q>(query) };
+        }
+        let index = self.ready[self.next % AHEAD_RAYS];
+        self.next += 1;
+        Some((index as usize, self.root.code))
     }
 
     #[inline(always)]
@@ -204,6 +263,83 @@ impl<Q: BatchQuery> Source<Q> for FromEntry<'_> {
             match entry {
                 Some(code) => return Some((index, code)),
                 None => query.miss(index),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aabb::Aabb;
+    use crate::kernel::level::Level;
+    use crate::kernel::random::Random;
+    use crate::kernel::slot::Loaded;
+
+    /// Rays about a box, every seventh of them odd.
+    fn rays(random: &mut Random) -> Vec<Ray> {
+        let odd = [0.0, -0.0, f32::NAN, f32::INFINITY, 1e13, -1e13, 1e-13, 1e-40, f32::MAX, 1.0];
+        let mut draw = |i: usize, scale: f32| {
+            let pick = (random.signed().abs() * odd.len() as f32) as usize % odd.len();
+            if i.is_multiple_of(7) && random.signed() > 0.3 {
+                odd[pick]
+            } else {
+                random.signed() * scale
+            }
+        };
+        (0..8 * 2000)
+            .map(|i| {
+                let (origin, dir) = ([0; 3].map(|_| draw(i, 3.0)), [0; 3].map(|_| draw(i, 1.0)));
+                let (t_min, t_max) = (draw(i, 1.0), 1.0 + draw(i, 6.0));
+                let t_max = if i % 3 == 0 { f32::INFINITY } else { t_max };
+                Ray::new(origin, dir).with_range(t_min, t_max)
+            })
+            .collect()
+    }
+
+    /// # Safety
+    /// The machine must have the features of `L`.
+    unsafe fn check<L: Simd>(all: bool) {
+        let mut random = Random(9);
+        let bounds = Aabb { min: [-1.0, -0.5, -1.5], max: [1.0, 0.75, 0.0] };
+        let (root, rays) = (Root::new(&bounds, 16), rays(&mut random));
+        let mut slot = Slot::new();
+        let (mut left_out, mut met) = (0, 0);
+        for first in (0..rays.len() as u32).step_by(WIDTH) {
+            let index = std::array::from_fn(|lane| (first + 5 * lane as u32) % rays.len() as u32);
+            // SAFETY: passed on to the caller.
+            let misses = unsafe { L::miss_box(&rays, &index, &root) };
+            for (lane, &i) in index.iter().enumerate() {
+                let ray = &rays[i as usize];
+                // SAFETY: as above.
+                let loaded = unsafe { L::load(&mut slot, ray, i, &root) };
+                let misses = misses >> lane & 1 == 1;
+                assert!(!misses || loaded == Loaded::Misses, "{ray:?} {loaded:?}");
+                // Odd ones may be looked at for nothing.
+                if all && i % 7 != 0 && ray.t_min <= ray.t_max {
+                    assert_eq!(misses, loaded == Loaded::Misses, "{ray:?}");
+                }
+                left_out += u32::from(misses);
+                met += u32::from(loaded == Loaded::Ready);
+            }
+        }
+        assert!(met > 500 && (!all || left_out > 5000), "{met} {left_out}");
+    }
+
+    #[test]
+    fn rays_that_are_left_out_miss_the_box() {
+        for level in Level::ALL.into_iter().filter(|level| level.is_available()) {
+            // SAFETY: the level is available.
+            unsafe {
+                match level {
+                    Level::Scalar => check::<crate::kernel::scalar::Scalar>(false),
+                    #[cfg(target_arch = "x86_64")]
+                    Level::Avx2 => check::<crate::kernel::avx2::Avx2>(true),
+                    #[cfg(target_arch = "x86_64")]
+                    Level::Avx512 => check::<crate::kernel::avx512::Avx512>(true),
+                    #[cfg(not(target_arch = "x86_64"))]
+                    _ => {}
+                }
             }
         }
     }

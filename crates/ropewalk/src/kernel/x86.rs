@@ -10,7 +10,7 @@
 #![allow(unsafe_code)]
 
 use super::level::{DEPTH_SLACK, ROUNDED_DEPTH, ROUNDED_SIZE, Root, WEIGHT_SLACK};
-use super::slot::{EDGE_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
+use super::slot::{EDGE_SLACK, INTERVAL_SLACK, LARGE, Loaded, NEAR_ZERO, SMALL, Slot, TINY, later};
 use super::vicinity::Cells;
 use crate::ray::Ray;
 use crate::wide::{AXIS_SHIFTS, Block, Flips, ORDER, Treelet, WIDTH};
@@ -94,6 +94,84 @@ pub unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loade
         slot.start(ray, index);
         slot.push_root(root.code, enter, exit);
         if enter <= later(exit) { Loaded::Ready } else { Loaded::Misses }
+    }
+}
+
+/// Rows of eight rays: origins, directions, ends of their ranges.
+#[inline(always)]
+unsafe fn rows(rays: &[Ray], index: &[u32; WIDTH]) -> [__m256; 8] {
+    // SAFETY: the caller vouches for the features; a ray is eight floats.
+    unsafe {
+        let mut x = [_mm256_setzero_ps(); 8];
+        for i in 0..8 {
+            x[i] = _mm256_loadu_ps(std::ptr::from_ref(&rays[index[i] as usize]).cast());
+        }
+        let mut y = x;
+        for i in 0..4 {
+            y[2 * i] = _mm256_unpacklo_ps(x[2 * i], x[2 * i + 1]);
+            y[2 * i + 1] = _mm256_unpackhi_ps(x[2 * i], x[2 * i + 1]);
+        }
+        for i in [0, 4] {
+            x[i] = _mm256_shuffle_ps::<0b01_00_01_00>(y[i], y[i + 2]);
+            x[i + 1] = _mm256_shuffle_ps::<0b11_10_11_10>(y[i], y[i + 2]);
+            x[i + 2] = _mm256_shuffle_ps::<0b01_00_01_00>(y[i + 1], y[i + 3]);
+            x[i + 3] = _mm256_shuffle_ps::<0b11_10_11_10>(y[i + 1], y[i + 3]);
+        }
+        for i in 0..4 {
+            y[i] = _mm256_permute2f128_ps::<0x20>(x[i], x[i + 4]);
+            y[i + 4] = _mm256_permute2f128_ps::<0x31>(x[i], x[i + 4]);
+        }
+        y
+    }
+}
+
+/// Of eight rays those of which [`load`] would say that they miss, number by number, except the odd ones.
+///
+/// # Safety
+/// As for [`load`].
+#[inline(always)]
+pub unsafe fn miss_box(rays: &[Ray], index: &[u32; WIDTH], root: &Root) -> u32 {
+    if !root.is_ordinary {
+        return 0;
+    }
+    // SAFETY: passed on to the caller.
+    unsafe {
+        let rows = rows(rays, index);
+        let sign = _mm256_set1_ps(-0.0);
+        let (mut enter, mut exit) = (rows[6], rows[7]);
+        let mut reach = _mm256_set1_ps(root.reach);
+        let (mut longest, mut least) = (_mm256_setzero_ps(), _mm256_set1_ps(f32::INFINITY));
+        // A vanishing component has an infinite inverse, which the sum shows, as any NaN and infinity.
+        let mut sum = _mm256_setzero_ps();
+        for a in 0..3 {
+            let (o, d) = (rows[a], rows[3 + a]);
+            let inv = _mm256_div_ps(_mm256_set1_ps(1.0), d);
+            let near = _mm256_mul_ps(_mm256_sub_ps(_mm256_set1_ps(root.min[a]), o), inv);
+            let far = _mm256_mul_ps(_mm256_sub_ps(_mm256_set1_ps(root.max[a]), o), inv);
+            enter = _mm256_max_ps(enter, _mm256_min_ps(near, far));
+            exit = _mm256_min_ps(exit, _mm256_max_ps(near, far));
+            reach = _mm256_max_ps(reach, _mm256_andnot_ps(sign, o));
+            let (size, inv_size) = (_mm256_andnot_ps(sign, d), _mm256_andnot_ps(sign, inv));
+            longest = _mm256_max_ps(longest, size);
+            least = _mm256_min_ps(least, inv_size);
+            sum = _mm256_add_ps(_mm256_add_ps(sum, size), inv_size);
+        }
+        let large = _mm256_set1_ps(LARGE);
+        let ordinary = _mm256_and_ps(
+            _mm256_and_ps(
+                _mm256_cmp_ps::<_CMP_LE_OQ>(reach, large),
+                _mm256_cmp_ps::<_CMP_LE_OQ>(longest, large),
+            ),
+            _mm256_and_ps(
+                _mm256_cmp_ps::<_CMP_GE_OQ>(longest, _mm256_set1_ps(SMALL)),
+                _mm256_cmp_ps::<_CMP_LT_OQ>(sum, _mm256_set1_ps(f32::INFINITY)),
+            ),
+        );
+        let near_zero = _mm256_mul_ps(_mm256_mul_ps(_mm256_set1_ps(NEAR_ZERO), reach), least);
+        let (enter, exit) = (_mm256_sub_ps(enter, near_zero), _mm256_add_ps(exit, near_zero));
+        let slack = _mm256_mul_ps(_mm256_andnot_ps(sign, exit), _mm256_set1_ps(INTERVAL_SLACK));
+        let misses = _mm256_cmp_ps::<_CMP_GT_OQ>(enter, _mm256_add_ps(exit, slack));
+        _mm256_movemask_ps(_mm256_and_ps(misses, ordinary)) as u32
     }
 }
 

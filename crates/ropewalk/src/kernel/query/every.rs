@@ -51,8 +51,9 @@ struct Found {
 /// Rays whose hits are known but not their parameters.
 #[derive(Default)]
 struct Finished {
-    /// The rays, where their hits begin, and how many there are.
+    /// The rays, where their hits begin, and how many there are; the first `count` are in use.
     rays: Vec<(Sheared, usize, usize)>,
+    count: usize,
     /// Primitives of the hits; the first `len` are in use.
     id: Vec<u32>,
     /// Where their triangles lie.
@@ -84,6 +85,9 @@ impl Found {
     }
 
     fn clear(&mut self, first: usize) {
+        if self.id.is_empty() {
+            self.grow();
+        }
         (self.len, self.due) = (0, due(first));
         self.keys.clear();
     }
@@ -96,30 +100,35 @@ fn eight(row: &mut [u32], from: usize) -> &mut [u32; WIDTH] {
 }
 
 impl Finished {
-    /// Adds the hits of a ray.
+    /// Adds the hits of a ray; without a branch, since whether it has any cannot be predicted.
     #[inline(always)]
     fn push(&mut self, slot: &Slot, rays: &[Ray], found: &Found) {
-        let (start, owner) = (self.len, self.rays.len() as u32);
-        if start + room(found.len) + WIDTH > self.id.len() {
+        let (start, owner) = (self.len, self.count);
+        if start + room(found.len) + WIDTH > self.id.len() || owner == self.rays.len() {
             self.grow(start + room(found.len) + WIDTH);
         }
-        self.rays.push((Sheared::default(), start, found.len));
-        if let Some((ray, ..)) = self.rays.last_mut() {
-            ray.set(slot, rays);
-        }
+        let (ray, from, count) = &mut self.rays[owner];
+        ray.set(slot, rays);
+        (*from, *count) = (start, found.len);
+        // Eight at least, if only to write over them.
         let mut i = 0;
-        while i < found.len {
+        loop {
             eight(&mut self.id, start + i).copy_from_slice(&found.id[i..i + WIDTH]);
             eight(&mut self.at, start + i).copy_from_slice(&found.at[i..i + WIDTH]);
-            eight(&mut self.owner, start + i).fill(owner);
+            eight(&mut self.owner, start + i).fill(owner as u32);
             i += WIDTH;
+            if i >= found.len {
+                break;
+            }
         }
         self.len += found.len;
+        self.count += usize::from(found.len > 0);
     }
 
     #[cold]
     fn grow(&mut self, least: usize) {
         let len = (2 * least).next_multiple_of(WIDTH);
+        self.rays.resize(len, (Sheared::default(), 0, 0));
         self.id.resize(len, 0);
         self.at.resize(len, 0);
         self.owner.resize(len, 0);
@@ -171,8 +180,7 @@ impl Every {
     pub fn start(&mut self, first: usize, rays: usize, slots: usize) {
         self.first = first;
         self.len = 0;
-        self.finished.len = 0;
-        self.finished.rays.clear();
+        (self.finished.len, self.finished.count) = (0, 0);
         self.found.resize(slots, Found::default());
         self.found.iter_mut().for_each(|found| found.clear(first));
         self.range.resize(rays, (0, 0));
@@ -231,8 +239,8 @@ impl Every {
         // SAFETY: passed on to the caller.
         unsafe { self.finished.settle::<L>(exact) };
         self.reserve(self.finished.len);
-        let Finished { rays, keys, .. } = &mut self.finished;
-        for &(ray, start, count) in &*rays {
+        let Finished { rays, count, keys, .. } = &mut self.finished;
+        for &(ray, start, count) in &rays[..std::mem::take(count)] {
             let keys = &mut keys[start..start + count];
             let (t, prim) = (&mut self.t[self.len..], &mut self.prim[self.len..]);
             // SAFETY: passed on to the caller.
@@ -240,7 +248,6 @@ impl Every {
             self.range[ray.ray as usize] = (self.len, count as u32);
             self.len += count;
         }
-        rays.clear();
         self.finished.len = 0;
     }
 
@@ -350,9 +357,7 @@ impl BatchQuery for Every {
             return self.answer_known(k, slot.ray, exact);
         }
         self.range[slot.ray as usize] = (0, 0);
-        if found.len > 0 {
-            self.finished.push(slot, exact.rays, found);
-        }
+        self.finished.push(slot, exact.rays, found);
         (found.len, found.due) = (0, due(self.first));
     }
 
