@@ -135,10 +135,10 @@ pub fn end_of<G: WalkerGeometry>(
     length: G::Float,
 ) -> Option<[G::Float; 3]> {
     let (to, valid) = end_or_not(geometry, from, direction, length);
-    valid.then_some(to)
+    (valid & fits(geometry, from)).then_some(to)
 }
 
-/// The same, and whether it is one: as a pair, which stays in registers.
+/// The same, and whether it is one, if the segment begins at a point that [`fits`]: as a pair, which stays in registers.
 #[inline(always)]
 fn end_or_not<G: WalkerGeometry>(
     geometry: &G,
@@ -148,11 +148,14 @@ fn end_or_not<G: WalkerGeometry>(
 ) -> ([G::Float; 3], bool) {
     let end = |a: usize| G::Float::rounded(from[a].into() + direction[a].into() * length.into());
     let to = [end(0), end(1), end(2)];
-    let fits = |p: [G::Float; 3]| {
-        let [x, y, z] = geometry.scaled(p.map(Into::into));
-        (x.abs() <= G::LARGEST) & (y.abs() <= G::LARGEST) & (z.abs() <= G::LARGEST)
-    };
-    (to, (length.into() >= 0.0) & fits(from) & fits(to))
+    (to, (length.into() >= 0.0) & fits(geometry, to))
+}
+
+/// True if a point is one, and not too far away.
+#[inline(always)]
+fn fits<G: WalkerGeometry>(geometry: &G, point: [G::Float; 3]) -> bool {
+    let [x, y, z] = geometry.scaled(point.map(Into::into));
+    (x.abs() <= G::LARGEST) & (y.abs() <= G::LARGEST) & (z.abs() <= G::LARGEST)
 }
 
 /// Particles in a scene of triangles.

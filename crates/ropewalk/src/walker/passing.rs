@@ -1,7 +1,7 @@
 //! Particles that nothing stops.
 
 use super::lists::Lists;
-use super::{WalkerGeometry, end_or_not};
+use super::{WalkerGeometry, end_or_not, fits};
 use crate::kernel::{Crossings, PACKET, Supply, WAVE};
 use crate::ray::Ray;
 
@@ -49,11 +49,17 @@ impl<'a, G: WalkerGeometry> Supply<Crossings<'a, G>> for Passing<'a, G> {
             let particle = self.particle;
             let (first, end) = (offsets[particle], offsets[particle + 1]);
             let mut from = self.lists.positions[particle];
-            while made < PACKET && self.next < end {
-                let at = self.next;
-                self.next += 1;
-                let (to, valid) = end_or_not(geometry, from, directions[at], lengths[at]);
-                if !valid {
+            let mut passed = self.lists.stopped[particle];
+            // Those that segments lead to have been looked at.
+            let is_point = fits(geometry, from);
+            let segments = directions[self.next..end].iter().zip(&lengths[self.next..end]);
+            for (at, (&direction, &length)) in (self.next..end).zip(segments) {
+                if made == PACKET {
+                    break;
+                }
+                self.next = at + 1;
+                let (to, valid) = end_or_not(geometry, from, direction, length);
+                if !(valid & is_point) {
                     self.lists.invalid += 1;
                     continue;
                 }
@@ -62,7 +68,7 @@ impl<'a, G: WalkerGeometry> Supply<Crossings<'a, G>> for Passing<'a, G> {
                 }
                 let new = &mut self.made[made];
                 (new.particle, new.segment) = (particle as u32, (at - first) as u32);
-                new.passed = std::mem::replace(&mut self.lists.stopped[particle], u32::MAX);
+                new.passed = std::mem::replace(&mut passed, u32::MAX);
                 // Number by number: copied as a whole they would be read back before they are written.
                 for a in 0..3 {
                     (new.from[a], new.to[a]) = (from[a], to[a]);
@@ -72,6 +78,7 @@ impl<'a, G: WalkerGeometry> Supply<Crossings<'a, G>> for Passing<'a, G> {
                 from = to;
             }
             self.lists.positions[particle] = from;
+            self.lists.stopped[particle] = passed;
             self.particle += usize::from(self.next >= end);
         }
         made

@@ -1,7 +1,7 @@
 //! Particles that stop at what they meet.
 
 use super::lists::Lists;
-use super::{Crossed, Float, WalkerGeometry, end_or_not};
+use super::{Crossed, Float, WalkerGeometry, end_or_not, fits};
 use crate::kernel::{Before, Crossings, Crowd, WAVE};
 use crate::ray::Ray;
 
@@ -54,6 +54,7 @@ impl<'a, G: WalkerGeometry> Stopping<'a, G> {
             }
             let (direction, length) = (lists.directions[at], lists.lengths[at]);
             let (to, valid) = end_or_not(lists.geometry, from, direction, length);
+            let valid = valid & fits(lists.geometry, from);
             if !valid {
                 lists.invalid += 1;
                 lists.walked[particle] += 1;
