@@ -8,9 +8,9 @@ use super::avx512::Avx512;
 use super::beam::{Eight, Pair, Sixteen};
 use super::entry::{Corners, Locate, REACH, Segment, path};
 use super::entry_packet::{Columns, PACKET};
-use super::x86::SIGN;
+use super::x86::{self, SIGN};
 use crate::ray::Ray;
-use crate::wide::{AXIS_SHIFTS, Block, Treelet};
+use crate::wide::{AXIS_SHIFTS, Block, Treelet, WIDTH};
 use std::arch::x86_64::*;
 
 /// [`Locate::segment`].
@@ -190,26 +190,9 @@ unsafe fn columns(rays: &[Ray; PACKET], columns: &mut Columns) {
     for half in 0..2 {
         // SAFETY: the caller vouches for the features; a ray is eight floats, columns are aligned.
         unsafe {
-            let mut rows = [_mm256_setzero_ps(); 8];
-            for (i, row) in rows.iter_mut().enumerate() {
-                *row = _mm256_loadu_ps(std::ptr::from_ref(&rays[8 * half + i]).cast::<f32>());
-            }
-            let mut fours = [[_mm256_setzero_ps(); 4]; 2];
-            for (i, four) in fours.iter_mut().enumerate() {
-                let [a, b, c, d] = [rows[4 * i], rows[4 * i + 1], rows[4 * i + 2], rows[4 * i + 3]];
-                let (e, f) = (_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
-                let (g, h) = (_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
-                four[0] = _mm256_shuffle_ps::<0x44>(e, g);
-                four[1] = _mm256_shuffle_ps::<0xEE>(e, g);
-                four[2] = _mm256_shuffle_ps::<0x44>(f, h);
-                four[3] = _mm256_shuffle_ps::<0xEE>(f, h);
-            }
-            for i in 0..4 {
-                let (a, b) = (fours[0][i], fours[1][i]);
-                let low = _mm256_permute2f128_ps::<0x20>(a, b);
-                let high = _mm256_permute2f128_ps::<0x31>(a, b);
-                _mm256_store_ps(columns.0[i].as_mut_ptr().add(8 * half), low);
-                _mm256_store_ps(columns.0[i + 4].as_mut_ptr().add(8 * half), high);
+            let rows = x86::rows(std::array::from_fn(|i| &rays[WIDTH * half + i]));
+            for i in 0..8 {
+                _mm256_store_ps(columns.0[i].as_mut_ptr().add(WIDTH * half), rows[i]);
             }
         }
     }

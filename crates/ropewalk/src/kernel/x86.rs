@@ -98,13 +98,16 @@ pub unsafe fn load(slot: &mut Slot, ray: &Ray, index: u32, root: &Root) -> Loade
 }
 
 /// Rows of eight rays: origins, directions, ends of their ranges.
+///
+/// # Safety
+/// The machine must have AVX2, and the caller must enable it.
 #[inline(always)]
-unsafe fn rows(rays: &[Ray], index: &[u32; WIDTH]) -> [__m256; 8] {
+pub unsafe fn rows(rays: [&Ray; WIDTH]) -> [__m256; 8] {
     // SAFETY: the caller vouches for the features; a ray is eight floats.
     unsafe {
         let mut x = [_mm256_setzero_ps(); 8];
         for i in 0..8 {
-            x[i] = _mm256_loadu_ps(std::ptr::from_ref(&rays[index[i] as usize]).cast());
+            x[i] = _mm256_loadu_ps(std::ptr::from_ref(rays[i]).cast());
         }
         let mut y = x;
         for i in 0..4 {
@@ -136,7 +139,7 @@ pub unsafe fn miss_box(rays: &[Ray], index: &[u32; WIDTH], root: &Root) -> u32 {
     }
     // SAFETY: passed on to the caller.
     unsafe {
-        let rows = rows(rays, index);
+        let rows = rows(index.map(|i| &rays[i as usize]));
         let sign = _mm256_set1_ps(-0.0);
         let (mut enter, mut exit) = (rows[6], rows[7]);
         let mut reach = _mm256_set1_ps(root.reach);
